@@ -40,6 +40,18 @@ std::vector<int> EvidenceModel::groups_of(const std::string& effect) const {
   return found;
 }
 
+int EvidenceModel::widest(int g) const {
+  int found = g;
+  const bool may_widen = !group(g).learnt && group(g).curve_sd == 0;
+  for (int other = 0; other < group_count() && may_widen; ++other) {
+    if (first_column(other) == first_column(g) && !group(other).learnt &&
+        group(other).prior_sd > group(found).prior_sd) {
+      found = other;
+    }
+  }
+  return found;
+}
+
 void EvidenceModel::set_time_constant(int g, double tau_s) {
   for (int other = 0; other < group_count(); ++other) {
     if (first_column(other) == first_column(g)) {

@@ -114,6 +114,9 @@ class EvidenceModel {
   const ParameterGroup& group(int g) const { return groups_[static_cast<std::size_t>(g)]; }
   int first_column(int g) const { return first_column_[static_cast<std::size_t>(g)]; }
   std::vector<int> groups_of(const std::string& effect) const;
+  // The same numbers with the widest prior that they have. What was learnt stays, and what bends:
+  // how much it bends goes with its size.
+  int widest(int g) const;
   // Of this group and of those that share its columns.
   void set_time_constant(int g, double tau_s);
   int columns() const { return columns_; }

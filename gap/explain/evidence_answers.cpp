@@ -126,12 +126,16 @@ std::optional<Explanation::Estimate> Explanation::estimate(const std::string& ef
   if (std::find(groups.begin(), groups.end(), chosen) == groups.end()) {
     groups = with_group(groups, chosen);
   }
-  Posterior posterior;
-  model_.evidence(data_, groups, &posterior);
-  const ParameterGroup& group = model_.group(chosen);
+  return estimate_of(chosen, std::move(groups));
+}
+
+Explanation::Estimate Explanation::estimate_of(int g, std::vector<int> groups) const {
+  std::ranges::transform(groups, groups.begin(), [&](int each) { return model_.widest(each); });
+  const Posterior posterior = model_.solve(data_.sums, groups).posterior();
+  const ParameterGroup& group = model_.group(g);
   Estimate estimate{{}, {}, group.tau_s};
   for (std::size_t k = 0; k < posterior.columns.size(); ++k) {
-    const int c = posterior.columns[k] - model_.first_column(chosen);
+    const int c = posterior.columns[k] - model_.first_column(g);
     if (c >= 0 && c < std::min(3, group.count)) {
       const auto i = static_cast<Eigen::Index>(k);
       estimate.value.push_back(posterior.mean[i]);
@@ -139,6 +143,31 @@ std::optional<Explanation::Estimate> Explanation::estimate(const std::string& ef
     }
   }
   return estimate;
+}
+
+std::vector<std::string> Explanation::left_open_by(const std::string& effect) const {
+  constexpr double kOpen = 3;
+  constexpr double kMatters = 0.5;  // of the smallest realistic size
+  const std::vector<int>& groups = best().subset.groups;
+  const auto own = std::ranges::find(groups, effect, [&](int g) { return model_.group(g).effect; });
+  std::vector<std::string> found;
+  if (own == groups.end()) {
+    return found;
+  }
+  const Estimate with = estimate_of(*own, groups);
+  for (const int g : groups) {
+    std::vector<int> others = groups;
+    std::erase(others, g);
+    const Estimate without = g == *own ? with : estimate_of(*own, others);
+    for (std::size_t i = 0; i < with.sd.size(); ++i) {
+      if (with.sd[i] > kOpen * without.sd[i] &&
+          with.sd[i] > kMatters * model_.group(*own).smallest) {
+        found.push_back(model_.group(g).effect);
+        break;
+      }
+    }
+  }
+  return found;
 }
 
 double Explanation::undetermined(const std::string& effect) const {

@@ -64,8 +64,15 @@ class Explanation {
     std::vector<double> sd;
     double tau_s = 0;
   };
-  // Of an effect of the best explanation, or of any other added to it.
+  // Of an effect of the best explanation, or of any other added to it. Each effect that does not
+  // bend has the prior of its full size, whatever size it was found by: numbers that the data leave open, as six faces
+  // leave a turn about (1, 1, 1) between tilt, misalignment and cross-axis terms, are as uncertain
+  // as the catalogue leaves them.
   std::optional<Estimate> estimate(const std::string& effect) const;
+  // Effects of the best explanation that leave the numbers of this one open: without one of them
+  // its standard uncertainty, which is half of its smallest realistic size and more, would be a
+  // third or less.
+  std::vector<std::string> left_open_by(const std::string& effect) const;
   // Posterior over prior standard deviation of the effect's worst parameter: 1 = the data say
   // nothing.
   double undetermined(const std::string& effect) const;
@@ -130,6 +137,8 @@ class Explanation {
     double occam_nats = 0;  // what the free numbers cost
   };
   Information information(int g, std::vector<int> others) const;
+  // Of group `g` among `groups`, all with their widest priors.
+  Estimate estimate_of(int g, std::vector<int> groups) const;
   // Per column of the best explanation: whether a simulation with the named effects has it.
   std::vector<bool> columns_of(const std::set<std::string>& named) const;
   // What one kind of scatter explains.

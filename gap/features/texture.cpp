@@ -178,6 +178,60 @@ void add_run(const Run& run, std::size_t stretch, TextureSums& sums) {
   }
 }
 
+// The first seconds after a move, in which no dwell of rest_pieces() begins.
+std::optional<RestPiece> piece_after_move(const Bundle& bundle, std::size_t segment,
+                                          double quiet_s) {
+  const Segment& from = bundle.segments[segment];
+  const std::size_t end = from.quiet_start(bundle.rate_hz);
+  const auto begin = static_cast<std::size_t>(quiet_s * bundle.rate_hz);
+  if (!from.at_rest() || begin >= end || end == from.samples) {
+    return std::nullopt;
+  }
+  return RestPiece{segment, from.first_sample + begin, end - begin};
+}
+
+// One for each of kStretches.
+std::vector<TextureSums> sums_after_moves(const Bundle& bundle, const CleanSamples& clean,
+                                          const std::vector<double>& lines_hz,
+                                          const std::function<double(double)>& ringing,
+                                          double quiet_s) {
+  std::vector<TextureSums> all(kStretches.size());
+  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
+    const auto piece = piece_after_move(bundle, s, quiet_s);
+    auto run = piece ? run_of(bundle, clean, *piece, lines_hz) : std::nullopt;
+    if (!run) {
+      continue;
+    }
+    for (std::size_t axis = 0; axis < 3 && ringing; ++axis) {
+      const double step_lsb = clean.accel_scale_lsb_per_g *
+                              bundle.segments[s].approach_g[static_cast<Eigen::Index>(axis)];
+      for (std::size_t i = 0; i < piece->samples; ++i) {
+        const double t_s = quiet_s + static_cast<double>(i) / bundle.rate_hz;
+        run->counts[axis][i] -= step_lsb * ringing(t_s);
+      }
+    }
+    for (std::size_t k = 0; k < kStretches.size(); ++k) {
+      add_run(*run, kStretches[k], all[k]);
+    }
+  }
+  return all;
+}
+
+// The variance after moves against that of the rest, whose own error counts, too.
+double after_moves(const TextureSums& early, const TextureSums& rest) {
+  double chi = 0, freedom = 0, known = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (rest.free_of_grid(axis) && early.n[axis] > 0) {
+      const double bunch = rest.bunch(axis);
+      chi += early.square[axis] / (rest.variance(axis) * bunch);
+      freedom += early.n[axis] / bunch;
+      known += rest.n[axis] / bunch;
+    }
+  }
+  const double both = freedom > 0 ? 1 / (1 / freedom + 1 / known) : 0;
+  return freedom > 0 ? normal_of(chi / freedom * both, both) : 0;
+}
+
 // One for each of kStretches.
 std::vector<TextureSums> sums_of(const Bundle& bundle, const CleanSamples& clean,
                                  const std::vector<double>& lines_hz) {
@@ -300,12 +354,15 @@ void moments(const std::vector<const TextureSums*>& scales, Texture::Scale& foun
 }  // namespace
 
 Texture noise_texture(const Bundle& bundle, const CleanSamples& clean,
-                      const std::vector<double>& lines_hz) {
+                      const std::vector<double>& lines_hz,
+                      const std::function<double(double t_s)>& ringing, double quiet_s) {
   Texture texture;
   if (bundle.rate_hz < 10) {
     return texture;
   }
   const std::vector<TextureSums> all = sums_of(bundle, clean, lines_hz);
+  const std::vector<TextureSums> early =
+      sums_after_moves(bundle, clean, lines_hz, ringing, quiet_s);
   std::vector<const TextureSums*> fine;
   texture.scales.reserve(all.size() + 1);
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -314,6 +371,7 @@ Texture noise_texture(const Bundle& bundle, const CleanSamples& clean,
     tails(all[i], all.front(), scale);
     scale.dwells_sd = dwells({&all[i]});
     moments({&all[i]}, scale);
+    scale.after_moves_sd = after_moves(early[i], all[i]);
     texture.scales.push_back(scale);
     if (kStretches[i] <= 8) {
       fine.push_back(&all[i]);

@@ -9,11 +9,12 @@
 // Differences between the means of neighbouring stretches (Haar's wavelets) of 1 to 64 samples.
 // Whatever filter stands behind Gaussian noise, each scale's are Gaussian, of one variance in all
 // dwells and at all times; only their correlation is the filter's, and it is measured. Knocks,
-// spells of louder noise, machines that come and go, and anything that is not linear are not like
-// that. No form of theirs is assumed.
+// spells of louder noise, machines that come and go, what follows moves, and anything that is not
+// linear are not like that. No form of theirs is assumed.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "gap/recording/bundle.h"
@@ -31,14 +32,17 @@ struct Texture {
     double moments_sd = 0;     // energies of all axes from moment to moment (1.28 s)
     double loudest_sd = 0;     // the loudest moment, their number allowed for
     std::size_t loudest_segment = 0;
+    double after_moves_sd = 0;  // energy of the first seconds after moves against the rest
   };
   std::vector<Scale> scales;
 };
 
 // Scales at which rounding to whole counts would show are left out. Lines at these frequencies are
 // taken off first, from each dwell by its own amplitude and phase, and dwells in which the clock
-// slips are left out then.
+// slips are left out then. `ringing`: the deviation at `t` seconds after a move, as a share of its
+// step (StepResponse::model), which is taken off, too. `quiet_s`: so much after a move is left out.
 Texture noise_texture(const Bundle& bundle, const CleanSamples& clean,
-                      const std::vector<double>& lines_hz = {});
+                      const std::vector<double>& lines_hz = {},
+                      const std::function<double(double t_s)>& ringing = {}, double quiet_s = 0);
 
 }  // namespace sixpoint::gap

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -97,13 +98,25 @@ std::string Diagnosis::brief() const {
     return fmt::format("nothing can be said: {}",
                        losses.empty() ? "too little data" : losses.back());
   }
+  const auto named = [this](const std::string& name) {
+    return std::ranges::any_of(effects, [&](const EffectFinding& e) { return e.name == name; });
+  };
   std::string names;
+  std::set<std::string> open;
   for (const EffectFinding& effect : effects) {
-    names += (names.empty() ? "" : " and ") + effect.name;
-    for (std::size_t i = 0; i < effect.confounded_with.size(); ++i) {
-      names += (i == 0 ? " (or " : ", ") + effect.confounded_with[i];
+    std::vector<std::string> instead;
+    for (const std::string& other : effect.confounded_with) {
+      if (named(other)) {
+        open.insert({effect.name, other});
+      } else {
+        instead.push_back(other);
+      }
     }
-    names += effect.confounded_with.empty() ? "" : ")";
+    names += (names.empty() ? "" : " and ") + effect.name;
+    names += instead.empty() ? "" : fmt::format(" (or {})", fmt::join(instead, ", "));
+  }
+  if (!open.empty()) {
+    names += fmt::format(" (how much each of {} has is open)", fmt::join(open, ", "));
   }
   const bool plural = effects.size() > 1;
   const CatalogueEntry* first = effects.empty() ? nullptr : find_entry(effects.front().name);

@@ -164,7 +164,8 @@ double other_size_nats(const SlowNoise& slow, Scatter kind, double size) {
   return best - here - kCost_nats;
 }
 
-// Other effects that would do nearly as well in its place.
+// Other effects that would do nearly as well in its place, and those beside it that leave its
+// numbers open.
 std::vector<std::string> confounded(const Request& request, const Explanation& explanation,
                                     const std::string& name, const Findings& found,
                                     const Findings& before) {
@@ -176,6 +177,9 @@ std::vector<std::string> confounded(const Request& request, const Explanation& e
         !before.accepted(other) && explanation.stand_in_nats(name, other) > kStandIn_nats) {
       others.push_back(other);
     }
+  }
+  for (std::string& other : explanation.left_open_by(name)) {
+    others.push_back(std::move(other));
   }
   if (name == "local_gravity") {
     others.emplace_back("gain");

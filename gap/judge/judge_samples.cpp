@@ -146,7 +146,8 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
   Findings found;
   // Truncation changes noise about zero. What a strong line leaves where its frequency wanders is
   // neither noise nor another cause.
-  constexpr double kStrongLines = 0.1;  // share of the noise's variance
+  constexpr double kStrongLines = 0.1;    // share of the noise's variance
+  constexpr double kKnownRinging = 0.03;  // share of the ringing's own test, as in test_settling()
   const double white_mg =
       *std::min_element(records.noise.white_mg.begin(), records.noise.white_mg.end());
   if (before.accepted("truncation") ||
@@ -159,8 +160,20 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
   // Beside a line, of which something may be left, they count as any other test.
   const double exact = records.lines.list.empty() ? kAlarm_sd - kExactAlarm_sd : 0;
   const std::vector<UnknownPlace> everywhere = noise_places(request);
-  for (const Texture::Scale& scale :
-       noise_texture(request.bundle, records.clean, frequencies_of(records.lines)).scales) {
+  // What settling, which is named, follows moves with is taken off; its form is known to a share.
+  const StepResponse& step = records.settling.step;
+  const bool settles = before.accepted("settling");
+  // The jump of a filter that began at rest: four of its time constants.
+  const Response& response = records.response;
+  constexpr double kFilter = 4 / (2 * M_PI);
+  const double quiet_s = response.low_pass_significant
+                             ? kFilter / response.low_pass.corner_hz * response.low_pass.order
+                             : 0;
+  const Texture texture = noise_texture(
+      request.bundle, records.clean, frequencies_of(records.lines),
+      settles ? [&](double t_s) { return step.model(t_s); } : std::function<double(double)>(),
+      quiet_s);
+  for (const Texture::Scale& scale : texture.scales) {
     const std::string noise =
         scale.samples == 0
             ? "the fast noise"
@@ -175,6 +188,8 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
                everywhere);
     found.test(scale.moments_sd + exact, fmt::format("codes: {} comes and goes", noise),
                everywhere);
+    found.test(scale.after_moves_sd - (settles ? kKnownRinging * step.left_without_sd : 0),
+               fmt::format("transient: {} is louder after moves", noise), everywhere);
     found.test(scale.loudest_sd + exact,
                fmt::format("codes: {} is loud for a moment (segment {})", noise,
                            request.bundle.segments[scale.loudest_segment].name));

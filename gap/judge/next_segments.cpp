@@ -114,6 +114,21 @@ std::vector<PlannedPiece> soak() {
   return pieces;
 }
 
+// A pose lies about the vertical as it lay in the recording, where that has it: repeated faces are
+// no turned ones.
+Eigen::Matrix3d as_recorded(const Eigen::Matrix3d& planned, const std::vector<Block>& recorded) {
+  constexpr double kSamePose = 0.999;  // cosine
+  const Eigen::Vector3d up = planned.col(2);
+  const auto same = std::ranges::find_if(
+      recorded, [&](const Block& block) { return block.rotation.col(2).dot(up) > kSamePose; });
+  if (same == recorded.end()) {
+    return planned;
+  }
+  const Eigen::Matrix3d untwisted =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix();
+  return same->rotation * (untwisted.transpose() * planned);
+}
+
 // Planned pieces as blocks that follow those of the recording.
 std::vector<Block> blocks_of(const std::vector<PlannedPiece>& pieces,
                              const std::vector<Block>& recorded, double rate_hz) {
@@ -129,7 +144,7 @@ std::vector<Block> blocks_of(const std::vector<PlannedPiece>& pieces,
       block.approach_g = piece.rotation.col(2) - block.rotation.col(2);
       hold_step(block.held_sign, block.approach_g);
     }
-    block.rotation = piece.rotation;
+    block.rotation = as_recorded(piece.rotation, recorded);
     block.seconds = piece.seconds;
     block.middle_s = at_s + piece.seconds / 2;
     at_s += piece.seconds;
@@ -217,6 +232,24 @@ class Expectation {
     const double moved = now.mean.dot(after.solve(now.mean) - before.solve(now.mean));
     const double log_det = 2 * (half_log_determinant(before) - half_log_determinant(after));
     return 0.5 * std::max(0.0, ratio.trace() - static_cast<double>(ratio.rows()) - log_det + moved);
+  }
+
+  // Whether the planned segment leaves a third or less of a standard uncertainty of an effect of
+  // the explanation, with the priors of Explanation::estimate().
+  bool settles(const std::string& effect) const {
+    constexpr double kSettled = 3;
+    const std::vector<int> own = model_.groups_of(effect);
+    std::vector<int> groups = best_.subset.groups;
+    const auto at = std::ranges::find_first_of(groups, own);
+    if (at == groups.end()) {
+      return false;
+    }
+    const int g = model_.widest(*at);
+    groups.erase(at);
+    std::ranges::transform(groups, groups.begin(), [&](int each) { return model_.widest(each); });
+    const Eigen::VectorXd now = size_of(g, groups, own_).covariance.diagonal();
+    const Eigen::VectorXd then = size_of(g, groups, after_).covariance.diagonal();
+    return (now.array() > kSettled * kSettled * then.array()).any();
   }
 
  private:
@@ -310,6 +343,13 @@ class Questions {
                  : shows(offer_, abilities_, other, other.segment)) {
       ask(name + "/" + other_name, kEvenOdds,
           in_means ? expected_.weight_nats(name, other_name) : kBeyondDoubt_nats);
+    }
+  }
+
+  // How much each of two effects has that are both there.
+  void add_shares(const std::string& name, const CatalogueEntry& other) {
+    if (enough(offer_, abilities_, other) && expected_.settles(name)) {
+      ask(name + "/" + std::string(other.name), kEvenOdds, kBeyondDoubt_nats);
     }
   }
 
@@ -409,8 +449,11 @@ std::vector<NextSegment> next_segments(const Request& request, unsigned abilitie
     }
     for (const EffectFinding& e : found.effects) {
       for (const std::string& other : e.confounded_with) {
-        if (const CatalogueEntry* entry = find_entry(other)) {
+        const CatalogueEntry* entry = find_entry(other);
+        if (entry != nullptr && !explanation.best().contains(other)) {
           questions.add_either(e.name, *entry);
+        } else if (entry != nullptr && (!found.accepted(other) || e.name < other)) {  // once
+          questions.add_shares(e.name, *entry);
         }
       }
     }

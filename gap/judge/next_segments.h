@@ -21,6 +21,9 @@
 // | observable, with 0.99 and more                    | no question           |             |
 // | named, another looks like it, means show both     | even odds             | w beside it |
 // | named, another looks like it, samples show one    | even odds             | beyond doubt|
+// | named beside another that leaves its size open:   | even odds             | beyond doubt|
+// | the segment leaves a third of the uncertainty     |                       |             |
+// | ... it leaves more                                | no question           |             |
 // | what it needs is still missing with the segment   | no question           |             |
 //
 // Internal to gap/judge.

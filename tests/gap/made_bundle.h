@@ -20,6 +20,7 @@ struct MadeUnit {
   double seating_deg = 0.01;
   unsigned seed = 1;
   int rounds = 1;                // how often the eighteen dwells are made
+  int yaws = 4;                  // poses differ by quarter turns about the vertical; 1: they do not
   std::size_t long_samples = 0;  // of one more record in the last pose, if not 0
 };
 
@@ -64,7 +65,7 @@ inline gap::Bundle made_production(const MadeUnit& unit, const MadeForce& force 
     segment.first_sample = bundle.samples.size();
     segment.samples = i < dwells ? 1000 : unit.long_samples;
     segment.host_start_s = host_s;
-    segment.rotation = up_along(order[i] / 2, order[i] % 2 == 0 ? 1 : -1, order[i] % 4);
+    segment.rotation = up_along(order[i] / 2, order[i] % 2 == 0 ? 1 : -1, order[i] % unit.yaws);
     segment.temperature_start_c = segment.temperature_end_c = 23;
     segment.placement = static_cast<int>(i);
     segment.pose = order[i];

@@ -26,7 +26,7 @@ Texture texture_of(const tests::MadeForce& force) {
 }
 
 struct Worst {
-  double tails = 0, dwells = 0, moments = 0, loudest = 0;
+  double tails = 0, dwells = 0, moments = 0, loudest = 0, after_moves = 0;
 };
 Worst worst_of(const Texture& texture) {
   Worst worst;
@@ -35,6 +35,7 @@ Worst worst_of(const Texture& texture) {
     worst.dwells = std::max(worst.dwells, scale.dwells_sd);
     worst.moments = std::max(worst.moments, scale.moments_sd);
     worst.loudest = std::max(worst.loudest, scale.loudest_sd);
+    worst.after_moves = std::max(worst.after_moves, scale.after_moves_sd);
   }
   return worst;
 }
@@ -47,6 +48,7 @@ void expect_plain(const Texture& texture) {
   EXPECT_LT(worst.dwells, 4.5);
   EXPECT_LT(worst.moments, 4.5);
   EXPECT_LT(worst.loudest, 4.5);
+  EXPECT_LT(worst.after_moves, 4.5);
 }
 
 TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
@@ -58,6 +60,31 @@ TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
     smooth = 0.6 * smooth + noise();
     return Eigen::Vector3d(s.rotation.col(2) + smooth);
   }));
+}
+
+// What follows a move and is no share of its step: 10 mg at 8 Hz along z, whichever way the unit was
+// turned (a foreign generator's, which nothing saw). Ringing in proportion to the step is taken off.
+TEST(Texture, TheFirstSecondsAfterAMoveAreAsLoudAsTheRest) {
+  const auto ringing = [](double t) { return std::exp(-t / 0.4) * std::cos(2 * M_PI * 8 * t); };
+  MadeNoise noise;
+  const Worst same = worst_of(texture_of([&](const Segment& s, double t) {
+    return Eigen::Vector3d(s.rotation.col(2) + 0.01 * ringing(t) * Eigen::Vector3d::UnitZ() +
+                           noise());
+  }));
+  EXPECT_GT(same.after_moves, 10);
+  EXPECT_LT(std::max({same.dwells, same.moments, same.loudest}), 4.5) << "the rest is plain";
+  const auto by_step = [&](const Segment& s, double t) {
+    return Eigen::Vector3d(s.rotation.col(2) + 0.03 * ringing(t) * s.approach_g + noise());
+  };
+  tests::MadeUnit unit;
+  unit.noise_g.setConstant(1e-6);
+  const Bundle bundle = tests::made_production(unit, by_step);
+  const CleanSamples clean = clean_samples(bundle);
+  EXPECT_GT(worst_of(noise_texture(bundle, clean)).after_moves, 10);
+  EXPECT_LT(worst_of(noise_texture(bundle, clean, {}, [&](double t) { return 0.03 * ringing(t); }))
+                .after_moves,
+            4.5);
+  EXPECT_LT(worst_of(noise_texture(bundle, clean, {}, {}, 2.5)).after_moves, 4.5);
 }
 
 // Two lines are no noise once they are taken off; a spell of louder noise beside them still is one.

@@ -109,6 +109,58 @@ TEST(Diagnose, MisalignmentIsNamedAndMeasured) {
   }
 }
 
+// Six faces do not tell a tilt about the laboratory's x from a turn of the unit and cross-axis terms
+// along (1, 1, 1): a foreign generator's unit, of which the answer was off by eight standard
+// uncertainties. What is open is said, and which segment closes it.
+TEST(Diagnose, WhatSixFacesLeaveOpenIsSaid) {
+  const Eigen::Vector3d turn_deg(0.0989, 0.1515, 0.1173);
+  const Eigen::Vector3d cross(-0.00364, 0.00459, -0.00540);  // yz, xz, xy
+  const Eigen::Vector3d tilt_deg(-0.183, -0.232, 0);
+  const auto turned = [](const Eigen::Vector3d& vector_deg) {
+    const Eigen::Vector3d r = vector_deg * M_PI / 180;
+    return Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
+  };
+  Eigen::Matrix3d axes;
+  axes << 1, cross[2], cross[1], cross[2], 1, cross[0], cross[1], cross[0], 1;
+  tests::MadeUnit unit;
+  unit.yaws = 1;
+  const auto d = diagnose(tests::made_production(unit, [&](const Segment& s, double) {
+    return Eigen::Vector3d(axes * turned(turn_deg) * s.rotation * turned(tilt_deg).col(2));
+  }));
+  ASSERT_OK(d);
+  EXPECT_FALSE(d->unknown.present) << d->brief();
+  EXPECT_THAT(
+      d->brief(),
+      testing::HasSubstr("(how much each of misalignment, non_orthogonality, tilt has is open)"));
+  const struct {
+    const char* effect;
+    const char* parameter;
+    Eigen::Vector3d truth;
+    double open;  // of its standard uncertainty, at least
+  } kRows[] = {{"misalignment", "rotation_vector_deg", turn_deg, 0.05},
+               {"non_orthogonality", "yz_xz_xy", cross, 0.001},
+               {"tilt", "rotation_vector_deg", tilt_deg, 0.1}};
+  for (const auto& row : kRows) {
+    const NamedValue* p = parameter_of(*d, row.effect, row.parameter);
+    ASSERT_NE(p, nullptr) << row.effect << ": " << d->brief();
+    EXPECT_GT(p->sd[0], row.open) << row.effect;
+    for (std::size_t a = 0; a < 2; ++a) {
+      EXPECT_NEAR(p->value[a], row.truth[static_cast<Eigen::Index>(a)], 2 * p->sd[a]) << row.effect;
+    }
+  }
+  for (const EffectFinding& e : d->effects) {
+    EXPECT_EQ(e.confounded_with.size(), 2U) << e.name;
+  }
+  ASSERT_FALSE(d->next_segments.empty());
+  EXPECT_EQ(d->next_segments.front().name, "half_turn");
+  EXPECT_THAT(d->next_segments.front().separates, testing::Contains("misalignment/tilt"));
+  for (const NextSegment& next : d->next_segments) {
+    EXPECT_TRUE(next.name != "faces" ||
+                std::ranges::count(next.separates, "misalignment/tilt") == 0)
+        << "the same faces once more";
+  }
+}
+
 TEST(Diagnose, DocumentHasEveryKey) {
   const auto d = diagnose(tests::made_production({}));
   ASSERT_OK(d);
