@@ -62,13 +62,13 @@ TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
   }));
 }
 
-// What follows a move and is no share of its step: 10 mg at 8 Hz along z, whichever way the unit was
+// What follows a move and is no share of its step: 20 mg at 8 Hz along z, whichever way the unit was
 // turned (a foreign generator's, which nothing saw). Ringing in proportion to the step is taken off.
 TEST(Texture, TheFirstSecondsAfterAMoveAreAsLoudAsTheRest) {
   const auto ringing = [](double t) { return std::exp(-t / 0.4) * std::cos(2 * M_PI * 8 * t); };
   MadeNoise noise;
   const Worst same = worst_of(texture_of([&](const Segment& s, double t) {
-    return Eigen::Vector3d(s.rotation.col(2) + 0.01 * ringing(t) * Eigen::Vector3d::UnitZ() +
+    return Eigen::Vector3d(s.rotation.col(2) + 0.02 * ringing(t) * Eigen::Vector3d::UnitZ() +
                            noise());
   }));
   EXPECT_GT(same.after_moves, 10);
