@@ -23,6 +23,7 @@ std::vector<DriftPoint> drifting(const PerAxis<double>& half_span_mg, int rounds
     for (int k = 0; k < 15; ++k) {
       DriftPoint point;
       point.time_s = 70.0 * side + 4.0 * k;
+      point.duration_s = 4;
       point.direction = side % 6;
       const tests::Vector& n = tests::kSixSides[static_cast<std::size_t>(side % 6)];
       for (std::size_t a = 0; a < kAxes; ++a) {
@@ -47,7 +48,7 @@ TEST(ZeroDrift, ALineIsMeasuredAndShown) {
     EXPECT_NEAR(drift->half_span_mg[a], rates[a], 3 * drift->standard_uncertainty_mg[a]) << a;
     EXPECT_LT(drift->standard_uncertainty_mg[a], 2) << a;
   }
-  EXPECT_NEAR(drift->at_rest_s, 12 * 14 * 4, 1e-9);
+  EXPECT_NEAR(drift->at_rest_s, 12 * 15 * 4, 1e-9) << "fifteen blocks of 4 s a side";
   EXPECT_GT(drift->shown_mg(), std::sqrt(36 + 64 + 16) / 2);
 }
 
