@@ -52,6 +52,19 @@ TEST(ZeroDrift, ALineIsMeasuredAndShown) {
   EXPECT_GT(drift->shown_mg(), std::sqrt(36 + 64 + 16) / 2);
 }
 
+// What the clock jumps over while the unit lies on one side was not sampled.
+TEST(ZeroDrift, AJumpOfTheClockIsNoTimeAtRest) {
+  auto points = drifting({0, 0, 0}, 1, 0.3);
+  const double last_s = points.back().time_s;
+  for (std::size_t i = points.size() - 7; i < points.size(); ++i) {
+    points[i].time_s += 3600;
+  }
+  const auto drift = zero_drift(points);
+  ASSERT_TRUE(drift);
+  EXPECT_NEAR(drift->at_rest_s, 6 * 15 * 4, 1e-9);
+  EXPECT_NEAR(drift->within_s, last_s + 3600 + 4, 1e-9);
+}
+
 TEST(ZeroDrift, NoiseAloneIsNoDrift) {
   const auto drift = zero_drift(drifting({0, 0, 0}, 2, 0.3));
   ASSERT_TRUE(drift);
