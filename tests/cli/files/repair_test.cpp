@@ -288,7 +288,7 @@ TEST_F(RepairCommand, WhatFailedStandsInTheManifestAndInTheNextStep) {
   EXPECT_THAT(again.people, testing::Not(HasSubstr("sixpoint impact")));
   EXPECT_THAT(again.people, HasSubstr("1 of the files failed; do what their lines say"));
   EXPECT_THAT(again.people, HasSubstr("sixpoint repair " + archive_ + " -o " + out_));
-  const Json file = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"][1];
+  const Json file = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"][0];
   EXPECT_EQ(file["input"], archive_ + "/affected.gt3x");
   EXPECT_EQ(file["status"], "failed");
   EXPECT_TRUE(file["output"].is_null());
