@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "repair/archive/output_lock.h"
@@ -108,11 +109,31 @@ TEST(RepairJobTest, RefusesASecondJobAndAnEmptyFolder) {
 
 TEST(RepairJobTest, HoldsTheLockOfTheCommandAndLeavesItsManifest) {
   Machine machine;
-  bool was_locked = false;
-  RepairJob job(machine.memory.env, [&] {
-    was_locked = !repair::lock_for_repair(machine.memory.files, "out");
-    return machine.open();
-  });
+  // Whether the folder is locked whenever the recording or the manifest is opened.
+  class Looking final : public ForwardingFiles {
+   public:
+    explicit Looking(FileSystem& files) : ForwardingFiles(files), files_(files) {}
+    Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
+      look(path);
+      return ForwardingFiles::open(path);
+    }
+    Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+      look(path);
+      return ForwardingFiles::create(path);
+    }
+    int locked = 0;
+    int free = 0;
+
+   private:
+    void look(const std::string& path) {
+      if (path == "archive/a.gt3x" || path.starts_with("out/units.csv")) {
+        ++(repair::lock_for_repair(files_, "out") ? free : locked);
+      }
+    }
+    FileSystem& files_;
+  } looking(machine.memory.files);
+  Env env{machine.memory.clock, looking};
+  RepairJob job(env, [&] { return machine.open(); });
   {
     const auto command = repair::lock_for_repair(machine.memory.files, "out");
     ASSERT_OK(command);
@@ -126,7 +147,8 @@ TEST(RepairJobTest, HoldsTheLockOfTheCommandAndLeavesItsManifest) {
   while (job.to_json()["state"] == "running") {
     std::this_thread::yield();
   }
-  EXPECT_TRUE(was_locked) << "while the job is at work";
+  EXPECT_GE(looking.locked, 2) << "while the job is at work";
+  EXPECT_EQ(looking.free, 0);
   EXPECT_OK(repair::lock_for_repair(machine.memory.files, "out")) << "and not behind it";
   const Bytes csv = read_file(machine.memory.files, "out/manifest.csv").value();
   EXPECT_THAT(std::string(csv.begin(), csv.end()),
