@@ -53,10 +53,9 @@ Status validate(const Calibration& calibration);
 
 // Why no working ADXL362, the sensor of the units that 16CPAN03 affects, has these constants: one
 // sentence that names the axis; empty where it can. 150 to 350 LSB/g, and a zero within 0.75 g. The
-// datasheet has 250 LSB/g in the range of 8 g and zeros within 0.25 g; the units whose constants
-// are known have 230 to 280 LSB/g and zeros up to 0.4 g, the effect of the filter configuration
-// included. The bounds are wide on purpose: they find what was mistyped or is in other units of
-// measure, not what is a little wrong.
+// datasheet has 250 LSB/g in the range of 8 g; the real recordings in ../shared/data have 223 to
+// 278 LSB/g and zeros up to 0.35 g, and the filter configuration moves both. The bounds are wide on
+// purpose: they find what was mistyped or is in other units of measure, not what is a little wrong.
 std::string why_no_sensor(const Calibration& calibration);
 
 // Eq. 1-3. Fails as validate() does.
