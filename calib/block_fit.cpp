@@ -395,7 +395,7 @@ class BlockFitter {
         points.push_back({blocks_[i].start_time_s,
                           out_.best().calibration.to_g(blocks_[i].mean_lsb),
                           magnitude_g(out_.best(), point_of_block(blocks_[i])) - options_.gravity_g,
-                          out_.cells[cell_of(i)].neighbourhood});
+                          out_.cells[cell_of(i)].neighbourhood, blocks_[i].duration_s});
       }
     }
     out_.drift = zero_drift(points, options);

@@ -183,6 +183,27 @@ Status validate(const Calibration& calibration) {
   return {};
 }
 
+std::string why_no_sensor(const Calibration& calibration) {
+  constexpr double kLeast_lsb_per_g = 150;
+  constexpr double kMost_lsb_per_g = 350;
+  constexpr double kMostZero_g = 0.75;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double lsb_per_g = 1 / calibration.sensitivity_g_per_lsb[a];
+    const double zero_g = calibration.zero_lsb[a] * calibration.sensitivity_g_per_lsb[a];
+    // Written so that NaN fails.
+    if (!(lsb_per_g >= kLeast_lsb_per_g && lsb_per_g <= kMost_lsb_per_g)) {
+      return fmt::format("no sensor of these units has {:.4g} LSB/g on its {} axis ({} to {})",
+                         lsb_per_g, kAxisNames[a], kLeast_lsb_per_g, kMost_lsb_per_g);
+    }
+    if (!(std::abs(zero_g) <= kMostZero_g)) {
+      return fmt::format(
+          "no sensor of these units has a zero of {:.3g} g on its {} axis (within {})", zero_g,
+          kAxisNames[a], kMostZero_g);
+    }
+  }
+  return {};
+}
+
 Status validate(const CrossAxisMap& map) {
   constexpr double kMostTerm = 0.2;
   SIXPOINT_CHECK(validate(map.calibration));

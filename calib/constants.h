@@ -51,6 +51,13 @@ Status validate(const StoredConstants& stored);
 // 16-bit sensor can have (sensitivity within 1/32768 .. 1 g per LSB, zero within +-32768 LSB).
 Status validate(const Calibration& calibration);
 
+// Why no working ADXL362, the sensor of the units that 16CPAN03 affects, has these constants: one
+// sentence that names the axis; empty where it can. 150 to 350 LSB/g, and a zero within 0.75 g. The
+// datasheet has 250 LSB/g in the range of 8 g; the real recordings in ../shared/data have 223 to
+// 278 LSB/g and zeros up to 0.35 g, and the filter configuration moves both. The bounds are wide on
+// purpose: they find what was mistyped or is in other units of measure, not what is a little wrong.
+std::string why_no_sensor(const Calibration& calibration);
+
 // Eq. 1-3. Fails as validate() does.
 Result<Calibration> calibration_from(const StoredConstants& stored);
 

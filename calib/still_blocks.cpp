@@ -292,6 +292,7 @@ void StillBlockFinder::find_noise(Window& window) const {
 
 StillBlock StillBlockFinder::measure(const Window& window) const {
   StillBlock block;
+  block.duration_s = block_samples_ / rate_hz_;
   for (std::size_t a = 0; a < kAxes; ++a) {
     const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
     block.mean_g[a] = window.lines[a].mean * g_per_count_;

@@ -69,7 +69,8 @@ struct StillBlock {
   // variance of the regression line over the block, raw counts squared.
   PerAxis<double> ramp_variance_lsb2{};
   std::optional<double> temperature_c;
-  bool noisy = false;  // fails criterion 2 of the paper, taken by StillBlockOptions::noisy_sd_g
+  double duration_s = 0;  // its samples over the rate
+  bool noisy = false;     // fails criterion 2 of the paper, taken by StillBlockOptions::noisy_sd_g
 };
 
 // What the finder met, for reports.

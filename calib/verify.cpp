@@ -138,12 +138,14 @@ void check_uncertainty(const BlockFit& fit, Verification& out) {
                       (wide && fit.drift->allowance_mg() > out.undrifted_mg));
   if (hides) {
     out.reasons.push_back(fmt::format(
-        "the unit lay still for {:.1f} of the file's {:.0f} min, which does not rule out that its "
-        "zeros drifted meanwhile: {:.1f} mg in the worst direction could not be told from "
+        "the unit lay still for {:.1f} min in all, spread over {:.1f} min by the recording's "
+        "clock, "
+        "which does not rule out that its zeros drifted meanwhile: {:.1f} mg in the worst "
+        "direction could not be told from "
         "constants (limit {:.1f} mg); lay it on its six sides one right after another for two "
         "minutes each, or lay it on the first side again at the end and go round all six a second "
         "time",
-        fit.drift->at_rest_s / 60, fit.drift->span_s / 60,
+        fit.drift->at_rest_s / 60, fit.drift->within_s / 60,
         std::max(*out.hidden_drift_mg, fit.drift->allowance_mg()), Limits::hidden_drift_mg));
   }
   if (!(out.undrifted_mg <= Limits::worst_direction_mg) || (wide && !drifts && !hides)) {

@@ -162,7 +162,9 @@ Visits visits_of(std::span<const DriftPoint> points, const ZeroDriftOptions& opt
     if (const auto made = visit_of(visit, scatter)) {
       out.list.push_back(*made);
       out.middle_s += made->time_s * made->blocks;
-      out.at_rest_s += visit.back().time_s - visit.front().time_s;
+      for (const DriftPoint& point : visit) {
+        out.at_rest_s += point.duration_s;
+      }
     }
   };
   std::size_t begin = 0;
@@ -314,6 +316,7 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   }
   const Visits visits = visits_of(points, options);
   out.at_rest_s = visits.at_rest_s;
+  out.within_s = out.span_s + points.back().duration_s;
   out.visits = static_cast<int>(visits.list.size());
   if (out.visits < 2) {
     return std::nullopt;

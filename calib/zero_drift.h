@@ -57,6 +57,7 @@ struct DriftPoint {
   PerAxis<double> mean_g{};  // calibrated
   double error_g = 0;        // magnitude less gravity
   int direction = 0;         // points of one number share a misfit (DirectionCell::neighbourhood)
+  double duration_s = 0;     // of the block
 };
 
 struct ZeroDrift {
@@ -65,8 +66,9 @@ struct ZeroDrift {
   PerAxis<double> standard_uncertainty_mg{};
   double chi2 = 0;
   bool shown = false;
-  double span_s = 0;
-  double at_rest_s = 0;  // of it
+  double span_s = 0;     // from the first point to the last
+  double within_s = 0;   // from the first block's start to the last one's end
+  double at_rest_s = 0;  // of the blocks together: what was sampled
   int visits = 0;
   // What not knowing the rates adds to the covariance of (relative sensitivity X Y Z, zero in g
   // X Y Z), row by row, and how far knowing them would move the constants.

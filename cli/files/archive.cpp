@@ -10,7 +10,6 @@
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
-#include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
 #include "cli/people_text.h"
@@ -21,6 +20,7 @@
 #include "repair/archive/archive_plan.h"
 #include "repair/archive/archive_run.h"
 #include "repair/archive/plan_folder.h"
+#include "repair/batch/manifest.h"
 #include "repair/rescale/constants_finder.h"
 #include "station/records/software.h"
 
@@ -122,8 +122,6 @@ class Rerun {
   std::string output_;
 };
 
-bool wants_rerun(const MergedShard& shard) { return !shard.complete() || shard.failed > 0; }
-
 Json shards_to_json(const MergedArchive& merged, const Rerun& rerun) {
   Json shards = Json::array();
   for (const MergedShard& shard : merged.shards) {
@@ -135,25 +133,43 @@ Json shards_to_json(const MergedArchive& merged, const Rerun& rerun) {
          {"bytes", shard.bytes},
          {"bytes_done", shard.bytes_done},
          {"failed", shard.failed},
-         {"rerun", wants_rerun(shard) ? Json(rerun.shard(shard.shard)) : Json(nullptr)}});
+         {"rerun", shard.wants_rerun() ? Json(rerun.shard(shard.shard)) : Json(nullptr)}});
   }
   return shards;
 }
 
 void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& context) {
   std::vector<std::size_t> again;
+  bool another_plan = false;
   for (const MergedShard& shard : merged.shards) {
-    if (!wants_rerun(shard)) {
+    another_plan = another_plan || shard.wants_another_plan();
+    if (shard.plan_damaged) {
+      context.people << fmt::format(
+          "shard {}: its list of {} files was changed after the plan was made\n", shard.shard,
+          shard.files);
+    } else if (shard.changed > 0) {
+      context.people << fmt::format(
+          "shard {}: {} of its {} files changed since the plan was made\n", shard.shard,
+          shard.changed, shard.files);
+    }
+    if (!shard.wants_rerun()) {
       continue;
     }
     again.push_back(shard.shard);
     context.people << (shard.complete()
                            ? fmt::format(
                                  "shard {}: {} of its {} files failed; try them again: {}\n",
-                                 shard.shard, shard.failed, shard.files, rerun.shard(shard.shard))
+                                 shard.shard, shard.failed - shard.changed, shard.files,
+                                 rerun.shard(shard.shard))
                            : fmt::format("shard {} is {} ({} of {} files): {}\n", shard.shard,
                                          repair::to_string(shard.state), shard.files_done,
                                          shard.files, rerun.shard(shard.shard)));
+  }
+  if (another_plan) {
+    context.people
+        << "make another plan ('sixpoint archive plan' into another folder), which "
+           "takes files as they are now, and run it into the same output folder: what is "
+           "repaired already is left as it is\n";
   }
   if (again.size() > 1) {
     context.people << fmt::format("or all of them: {}\n", rerun.array(again));
@@ -188,7 +204,7 @@ class Merge {
       SIXPOINT_ASSIGN(manifest_folder_, repair::output_folder_of(context_.env.files, folder));
     }
     if (manifest_folder_) {
-      SIXPOINT_CHECK(check_manifest(context_.env.files, *manifest_folder_));
+      SIXPOINT_CHECK(repair::check_manifest(context_.env.files, *manifest_folder_));
       // Not there where no file had to be written.
       SIXPOINT_CHECK(make_synced_folders(context_.env.files, *manifest_folder_));
     }
@@ -228,9 +244,9 @@ class Merge {
     context_.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
     const auto units = table_.rows();
     if (manifest_folder_) {
-      report(write_manifest(context_.env.files, *manifest_folder_, reports_,
-                            context_.env.clock.now()));
-      report(write_units(context_.env.files, *manifest_folder_, units));
+      report(repair::write_manifest(context_.env.files, *manifest_folder_, reports_,
+                                    context_.env.clock.now(), station::software_and_build()));
+      report(repair::write_units(context_.env.files, *manifest_folder_, units));
     }
     const Json withdrawn = withdrawn_since();
     const Rerun rerun(context_.env.files, options_.plan);

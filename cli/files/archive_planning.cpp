@@ -67,8 +67,9 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
       draft.snapshot = &*snapshot;
     }
   }
-  SIXPOINT_CHECK(check_calibration_file(context, sources));
   if (!sources.calibration_file.empty()) {
+    SIXPOINT_CHECK(
+        repair::check_calibration_recording(context.env.files, sources.calibration_file));
     const std::string path = absolute(sources.calibration_file);
     SIXPOINT_ASSIGN(std::string digest, file_sha256(context.env.files, path));
     draft.repair.calibration_file = {path, std::move(digest)};

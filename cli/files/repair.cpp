@@ -6,7 +6,6 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/files/salvage_option.h"
 #include "cli/output.h"
@@ -15,15 +14,18 @@
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/archive/output_lock.h"
+#include "repair/batch/manifest.h"
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/units/unit_pool.h"
+#include "station/records/software.h"
 
 namespace sixpoint::cli {
 namespace {
 
 using repair::RepairReport;
+using repair::RepairStatus;
 
 struct RepairCommandOptions {
   std::vector<std::string> paths;
@@ -53,8 +55,9 @@ Result<repair::ConstantsFinderOptions> finder_options(const RepairCommandOptions
   }
   SIXPOINT_ASSIGN(store, store_of(context, sources));
   finder.store = store ? &*store : nullptr;
-  SIXPOINT_CHECK(check_calibration_file(context, sources));
   if (!sources.calibration_file.empty()) {
+    SIXPOINT_CHECK(
+        repair::check_calibration_recording(context.env.files, sources.calibration_file));
     finder.calibration_file = sources.calibration_file;
   }
   return finder;
@@ -129,8 +132,9 @@ Status leave_in_folder(const RepairCommandOptions& options,
   if (options.repair.dry_run || !disk.info(options.folder)) {
     return {};
   }
-  SIXPOINT_CHECK(write_manifest(disk, options.folder, reports, context.env.clock.now()));
-  SIXPOINT_CHECK(write_units(disk, options.folder, units));
+  SIXPOINT_CHECK(repair::write_manifest(disk, options.folder, reports, context.env.clock.now(),
+                                        station::software_and_build()));
+  SIXPOINT_CHECK(repair::write_units(disk, options.folder, units));
   return options.report ? write_study_report(context, disk, options.folder + "/report.html",
                                              "Repair into " + options.folder, reports)
                         : Status();
@@ -143,6 +147,13 @@ void say_what_is_next(const RepairCommandOptions& options, const std::vector<Rep
     context.worsen(kExitStopped);
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
                                   reports.size(), files, line_that_goes_on(options));
+    return;
+  }
+  const auto failed = std::ranges::count(reports, RepairStatus::failed, &RepairReport::status);
+  if (failed > 0) {  // impact refuses a pair that does not belong together
+    context.people << fmt::format(
+        "next: {} of the files failed; do what their lines say, then go on:\n  {}\n", failed,
+        line_that_goes_on(options));
     return;
   }
   const auto asked = context.env.files.info(options.paths.front());
@@ -168,7 +179,7 @@ Result<std::unique_ptr<FileLock>> lock_of(const RepairCommandOptions& options, C
 Status run_repair(const RepairCommandOptions& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
-  SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
+  SIXPOINT_CHECK(repair::check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
   repair::UnitPool pool;
   SIXPOINT_ASSIGN(auto how, finder_options(options, context, store, pool));

@@ -4,7 +4,6 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "gt3x/recording.h"
 #include "repair/batch/answers.h"
 #include "repair/report/study_report.h"
 #include "repair/rescale/repair_records.h"
@@ -74,22 +73,6 @@ Result<std::optional<db::Store>> store_of(Context& context, const RepairSources&
   }
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, sources.store));
   return store;
-}
-
-Status check_calibration_file(Context& context, const RepairSources& sources) {
-  const std::string& path = sources.calibration_file;
-  if (path.empty()) {
-    return {};
-  }
-  const auto recording = gt3x::Recording::open(context.env.files, path);
-  if (recording) {
-    return {};
-  }
-  Error error = recording.error();
-  if (path.ends_with(".json")) {
-    error.hint = "a calibration file is a recording; constants in JSON are given by --constants";
-  }
-  return fail(std::move(error));
 }
 
 void RepairTally::add(Context& context, const RepairReport& report) {

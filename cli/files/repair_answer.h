@@ -57,9 +57,6 @@ void add_redo_option(CLI::App& command, bool& redo_outdated);
 //   -        other cases                 the default store, where it exists
 Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources);
 
-// That --calibration-file is a recording, before the work begins; empty: it was not given.
-Status check_calibration_file(Context& context, const RepairSources& sources);
-
 using repair::failed_report;
 using repair::read_constants;
 

@@ -57,6 +57,7 @@ Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder
       const ShardStanding standing = standing_of(files, folder, plan, k);
       // It may have come to its end since the line before.
       shard.state = standing.state == ShardState::done ? ShardState::running : standing.state;
+      shard.plan_damaged = standing.plan_damaged;
       shard.files_done = standing.done.files;
       shard.bytes_done = standing.done.bytes;
       shard.failed = standing.done.failed;
@@ -71,6 +72,7 @@ Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder
         verify(files, report);
       }
       shard.failed += report.status == RepairStatus::failed ? 1 : 0;
+      shard.changed += has_changed_since_plan(report) ? 1 : 0;
     }
     merged.shards.push_back(shard);
     SIXPOINT_CHECK(options.visit(*result));

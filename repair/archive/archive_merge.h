@@ -28,8 +28,13 @@ struct MergedShard {
   std::size_t files_done = 0;
   std::uint64_t bytes = 0;  // of the inputs
   std::uint64_t bytes_done = 0;
-  std::size_t failed = 0;  // files that the next run tries again
+  std::size_t failed = 0;     // files that the next run tries again
+  std::size_t changed = 0;    // of these: has_changed_since_plan(), so the next run fails again
+  bool plan_damaged = false;  // as in ShardStanding
 
+  // What running the shard once more can change.
+  bool wants_rerun() const { return complete() ? failed > changed : !plan_damaged; }
+  bool wants_another_plan() const { return plan_damaged || changed > 0; }
   bool complete() const { return state == ShardState::done; }
 };
 

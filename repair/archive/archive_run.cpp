@@ -18,6 +18,9 @@
 namespace sixpoint::repair {
 namespace {
 
+// Results keep it: has_changed_since_plan() knows it again.
+constexpr const char* kChangedSincePlan = "the file changed since the plan was made";
+
 using Json = nlohmann::ordered_json;
 
 std::string results_of(const std::string& folder) { return folder + "/results"; }
@@ -279,7 +282,7 @@ class ShardRun {
   }
 
   static Error changed_since_plan(const std::string& input) {
-    return {ErrorCode::bad_data, "the file changed since the plan was made", input,
+    return {ErrorCode::bad_data, kChangedSincePlan, input,
             "find out what changed it; a new plan takes it as it is now"};
   }
 
@@ -308,6 +311,11 @@ class ShardRun {
 Result<ShardResult> run_shard(Env& env, const std::string& folder, const ArchivePlan& plan,
                               const ShardRunOptions& options) {
   return ShardRun(env, folder, plan, options).run();
+}
+
+bool has_changed_since_plan(const RepairReport& report) {
+  return report.status == RepairStatus::failed && report.error &&
+         report.error->what == kChangedSincePlan;
 }
 
 Result<std::optional<std::string>> output_folder_of(FileSystem& files, const std::string& folder) {

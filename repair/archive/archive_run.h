@@ -58,6 +58,10 @@ struct ShardRunOptions {
 Result<ShardResult> run_shard(Env& env, const std::string& folder, const ArchivePlan& plan,
                               const ShardRunOptions& options);
 
+// Whether the file failed because it is not as it was when the plan was made: only another plan
+// takes it.
+bool has_changed_since_plan(const RepairReport& report);
+
 // The output folder of the plan's runs; nothing before the first.
 Result<std::optional<std::string>> output_folder_of(FileSystem& files, const std::string& folder);
 

@@ -220,7 +220,10 @@ ShardStanding standing_of(FileSystem& files, const std::string& folder, const Ar
                           std::size_t shard) {
   const auto opened = ShardFolder::open(files, folder, plan, shard);
   if (!opened) {
-    return {ShardState::damaged, {}};
+    const ErrorCode code = opened.error().code;
+    const bool is_of_plan = code == ErrorCode::configuration || code == ErrorCode::bad_data ||
+                            code == ErrorCode::no_input;
+    return {ShardState::damaged, is_of_plan, {}};
   }
   ShardStanding standing;
   standing.done = progress_of(opened->manifest(), opened->known());

@@ -39,12 +39,15 @@ enum class ShardState {
   running,  // some run holds it
   partly,   // a run was stopped; the next one goes on
   missing,  // no run has begun
-  damaged,  // its result cannot be read: run it again
+  damaged,  // its result cannot be read: run it again, but for ShardStanding::plan_damaged
 };
 std::string_view to_string(ShardState state);
 
 struct ShardStanding {
   ShardState state = ShardState::missing;
+  // `damaged`, and no run can mend it: the plan's list of the shard's files is not as the plan
+  // wrote it, or is gone.
+  bool plan_damaged = false;
   RepairProgress done;  // as it was last written down
 };
 ShardStanding standing_of(FileSystem& files, const std::string& folder, const ArchivePlan& plan,

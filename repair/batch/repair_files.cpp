@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/bytes.h"
+#include "gt3x/recording.h"
 #include "repair/batch/jobs.h"
 #include "repair/rescale/output_place.h"
 #include "repair/rescale/repair_mark.h"
@@ -41,6 +42,7 @@ class Run {
     } else if (!waiting.empty()) {
       ask_units(waiting);
     }
+    finish_unchecked();
     std::vector<RepairReport> reports;
     for (std::optional<RepairReport>& answer : answers_) {
       if (answer) {
@@ -74,6 +76,7 @@ class Run {
   RepairOptions options_of_file(std::size_t files) const {
     RepairOptions how = options_.repair;
     how.resume = how.resume || how.redo_outdated;
+    how.leave_unchecked = files_.size() > 1;  // one file alone has no others to wait for
     const unsigned jobs = threads_of(options_.jobs);
     how.jobs = std::max(1U, jobs / static_cast<unsigned>(std::clamp<std::size_t>(files, 1, jobs)));
     return how;
@@ -93,12 +96,23 @@ class Run {
     }
   }
 
-  void pass(const char* doing, const std::vector<std::size_t>& which) {
-    const RepairOptions how = options_of_file(which.size());
+  // `refuted_by`: for each file, where the constants of unchecked ones were looked at; else empty.
+  void pass(const char* doing, const std::vector<std::size_t>& which,
+            const std::vector<std::string>& refuted_by = {}) {
+    RepairOptions all = options_of_file(which.size());
+    all.leave_unchecked = all.leave_unchecked && refuted_by.empty();
     begin(doing, which.size());
     for_each_job(
         which.size(), options_.jobs,
-        [&](std::size_t k) { answers_[which[k]] = repair_one(files_[which[k]], how); },
+        [&](std::size_t k) {
+          RepairOptions how = all;
+          how.refuted_by = refuted_by.empty() ? "" : refuted_by[which[k]];
+          RepairReport report = repair_one(files_[which[k]], how);
+          if (watch_.did) {
+            watch_.did(report);
+          }
+          answers_[which[k]] = std::move(report);
+        },
         [&](std::size_t done) { at(done); }, stop_);
   }
 
@@ -161,6 +175,38 @@ class Run {
     pass("repairing by the unit's other files", again);
   }
 
+  // The first file of `report`'s unit that refutes its constants; empty for none.
+  std::string refuted_by(const RepairReport& report) const {
+    const auto refutes = [&](const std::optional<RepairReport>& other) {
+      return other && other->refutes_constants && other->serial == report.serial && other->source &&
+             report.source && other->source->id == report.source->id;
+    };
+    const auto found = std::ranges::find_if(answers_, refutes);
+    return found == answers_.end() ? "" : (*found)->input;
+  }
+
+  // The files that no still periods of their own can check.
+  void finish_unchecked() {
+    std::vector<std::size_t> unchecked;
+    for (std::size_t i = 0; i < answers_.size(); ++i) {
+      if (answers_[i] && answers_[i]->waits_for_others) {
+        unchecked.push_back(i);
+      }
+    }
+    if (stop_ != nullptr && *stop_) {
+      return forget(unchecked);
+    }
+    if (unchecked.empty()) {
+      return;
+    }
+    std::vector<std::string> by(files_.size());
+    for (const std::size_t i : unchecked) {
+      by[i] = refuted_by(*answers_[i]);
+    }
+    forget(unchecked);
+    pass("repairing files without still periods", unchecked, by);
+  }
+
   Env& env_;
   const std::vector<NamedFile>& files_;
   const RepairFilesOptions& options_;
@@ -185,6 +231,18 @@ Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::stri
     return fail(std::move(error));
   }
   return record;
+}
+
+Status check_calibration_recording(FileSystem& files, const std::string& path) {
+  const auto recording = gt3x::Recording::open(files, path);
+  if (recording) {
+    return {};
+  }
+  Error error = recording.error();
+  if (path.ends_with(".json")) {
+    error.hint = "a calibration file is a recording; constants in JSON are given by --constants";
+  }
+  return fail(std::move(error));
 }
 
 RepairReport failed_report(const std::string& input, const Error& error) {

@@ -36,10 +36,12 @@ struct RepairFilesOptions {
   LinkMaker make_link;
 };
 
-// Called on the calling thread; both may be empty.
+// `begin` and `at` are called on the calling thread; each may be empty.
 struct RepairWatch {
   std::function<void(const char* doing, std::size_t files)> begin;  // a pass over so many files
   std::function<void(const RepairProgress&)> at;                    // as jobs.h calls
+  // Each file's report, on the thread that made it, once in each pass; may add reasons to it.
+  std::function<void(RepairReport&)> did;
 };
 
 // An output folder that lies in a tree that was named. What was found in it is no input:
@@ -54,8 +56,10 @@ struct RepairWatch {
 void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named, const std::string& folder);
 
 // Every file by itself, then those that wait for the other files of their unit, which `pool`
-// collected: the source asks it. A report for each file, in their order, but for those that were
-// not done when `stop` was set.
+// collected: the source asks it. Last those without still periods, which the gate cannot check:
+// what the others of the unit say against the same constants holds for them (gate.h, refutes()), so
+// that neither order nor jobs decide. A report for each file, in their order, but for those that
+// were not done when `stop` was set.
 std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& files,
                                        const RepairFilesOptions& options, ConstantsSource& source,
                                        UnitPool& pool, const RepairWatch& watch = {},
@@ -66,5 +70,8 @@ RepairReport failed_report(const std::string& input, const Error& error);
 
 // constants.json; errors name the file.
 Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path);
+
+// That a calibration file is a recording, before the work begins.
+Status check_calibration_recording(FileSystem& files, const std::string& path);
 
 }  // namespace sixpoint::repair

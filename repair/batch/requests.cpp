@@ -160,7 +160,7 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   SIXPOINT_ASSIGN(auto store, store_to_read(env, request.store));
   how.store = store ? &*store : nullptr;
   if (!request.calibration_file.empty()) {
-    SIXPOINT_CHECK(env.files.info(request.calibration_file));
+    SIXPOINT_CHECK(check_calibration_recording(env.files, request.calibration_file));
     how.calibration_file = request.calibration_file;
   }
   UnitPool pool;
@@ -180,7 +180,7 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   options.jobs = request.jobs;
   const auto reports = repair_files(
       env, named, options, finder, pool,
-      {{}, [&](const RepairProgress& done) { watching.watch(done.files); }}, watching.stop);
+      {{}, [&](const RepairProgress& done) { watching.watch(done.files); }, {}}, watching.stop);
   Json json;
   json["files"] = Json::array();
   for (const RepairReport& report : reports) {

@@ -193,9 +193,6 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
       options_.unit->add(path, survey, nullptr);
     }
     choice.reasons.push_back("its own still periods do not suffice: " + refusal_of(report));
-    choice.reasons.emplace_back(
-        "needed: the unit on the jig, or a calibration file made by it under firmware 1.4.0 to "
-        "1.7.0, lying still on each of its six sides");
     return {};
   }
   calib::ConstantsOrigin origin;
@@ -239,11 +236,18 @@ Status ConstantsFinder::ask(SourceKind kind, const std::string& path, const Surv
 
 Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const Survey& survey) {
   ConstantsChoice choice;
+  bool lacks_still_periods = false;
   for (const SourceKind kind : sources_in_order(options_)) {
     SIXPOINT_CHECK(ask(kind, path, survey, choice));
     if (choice.chosen || (choice.for_a_person && !options_.or_scan)) {
       break;
     }
+    lacks_still_periods = lacks_still_periods || kind == SourceKind::scan;
+  }
+  if (!choice.chosen && lacks_still_periods) {
+    choice.reasons.emplace_back(
+        "needed: the unit on the jig, or a calibration file made by it under firmware 1.4.0 to "
+        "1.7.0, lying still on each of its six sides");
   }
   return choice;
 }

@@ -16,7 +16,7 @@ double most_left_mg(const GateEvidence& evidence) {
 
 GateRow row_of(const GateEvidence& evidence) {
   if (evidence.directions == 0) {
-    return GateRow::not_checked;
+    return evidence.refuted_by.empty() ? GateRow::not_checked : GateRow::refuted;
   }
   if (evidence.after_mg > evidence.before_mg) {
     return GateRow::worse;
@@ -40,8 +40,8 @@ GateRow row_of(const GateEvidence& evidence) {
 }
 
 bool is_refused(GateRow row) {
-  return row == GateRow::worse || row == GateRow::no_better || row == GateRow::rounded_away ||
-         row == GateRow::too_much_left || row == GateRow::ambiguous;
+  return row == GateRow::refuted || row == GateRow::worse || row == GateRow::no_better ||
+         row == GateRow::rounded_away || row == GateRow::too_much_left || row == GateRow::ambiguous;
 }
 
 // By constants with a slope above 1 some stored counts have no raw count behind them; a hundredth
@@ -66,6 +66,11 @@ std::string reason_of(GateRow row, const GateEvidence& evidence) {
                        fmt::arg("after", evidence.after_mg));
   };
   switch (row) {
+    case GateRow::refuted:
+      return fmt::format(
+          "the file has no still periods, and those of {}, of the same unit, speak against these "
+          "constants: find out what is wrong there, or use other constants",
+          printable(evidence.refuted_by));
     case GateRow::not_checked:
       return "the file has no still periods: whether the repair helps could not be checked";
     case GateRow::worse:
@@ -115,8 +120,12 @@ GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh
     block.mean_g = map.to_g(block.mean_lsb);
   }
   std::vector<calib::DirectionCell> cells = calib::cells_of(after);
-  return {calib::number_neighbourhoods(cells, fresh), survey.magnitude.mean_mg,
-          magnitude_error(after).mean_mg, counts_are_the_units_own(survey)};
+  return {calib::number_neighbourhoods(cells, fresh),
+          survey.magnitude.mean_mg,
+          magnitude_error(after).mean_mg,
+          counts_are_the_units_own(survey),
+          std::nullopt,
+          {}};
 }
 
 std::string why_not_lent(const Survey& survey) {
@@ -147,6 +156,8 @@ std::string why_not_lent(const Survey& survey) {
       "software may have corrected it, so its constants are not used for other recordings",
       kMostOfCorrected_mg);
 }
+
+bool refutes(GateRow row) { return row == GateRow::worse || row == GateRow::too_much_left; }
 
 GateAnswer gate(const GateEvidence& evidence, bool force) {
   GateAnswer answer;

@@ -11,6 +11,8 @@
 //
 // | directions | before -> after                              | row           | written      |
 // |------------|----------------------------------------------|---------------|--------------|
+// | 0          | -, the gate refused the same constants on    | refuted       | with `force` |
+// |            | another file of the unit in this run         |               |              |
 // | 0          | -                                            | not_checked   | yes          |
 // | 1 or more  | after > before                               | worse         | with `force` |
 // | 1 or more  | before <= 64 mg, and after > before - 1 mg   | no_better     | with `force` |
@@ -28,6 +30,16 @@
 // were. 32 mg are left only by constants of another unit or another filter: uncertainty,
 // temperature and gravity together stay below 20 mg. In one to three directions wrong constants
 // look right by chance more often, so the limit is 20 mg there.
+//
+// What the gate says of a file against its constants holds for the unit's files without still
+// periods (refutes()):
+//
+// | row of the other file                                                      | refutes |
+// |----------------------------------------------------------------------------|---------|
+// | worse, too_much_left                                                       | yes     |
+// | any, but its own still periods contradict the constants (agreement.h)      | yes     |
+// | no_better, rounded_away, ambiguous: it may have been corrected before      | no      |
+// | any other                                                                  | no      |
 //
 // May constants that are solved from a recording be used for other recordings? They undo the
 // recording's own counts; these must be the sensor's (why_not_lent()):
@@ -72,12 +84,15 @@ struct GateEvidence {
   bool counts_are_the_units_own = false;
   // After, of the samples that were written; nothing as long as they are not.
   std::optional<double> written_mg = std::nullopt;
+  // Another file of the unit that refutes the same constants in this run; empty for none.
+  std::string refuted_by = {};
 };
 // `cross_axis`: the terms xy, xz, yz that are applied with the constants; all zero for none.
 GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh,
                            const PerAxis<double>& cross_axis = {});
 
 enum class GateRow {
+  refuted,
   not_checked,
   worse,
   no_better,
@@ -94,6 +109,7 @@ struct GateAnswer {
   std::string reason;   // for people; with both numbers where they decide; empty where it helps
 };
 GateAnswer gate(const GateEvidence& evidence, bool force);
+bool refutes(GateRow row);
 
 // A sentence; empty where its constants may be lent. The survey is of the whole recording.
 std::string why_not_lent(const Survey& survey);

@@ -151,7 +151,15 @@ class Repair {
         return fail(std::move(error));
       }
       SIXPOINT_CHECK(choose());
-      if (!chosen_.has_value() || !may_write()) {
+      if (!chosen_.has_value()) {
+        return not_repairable();
+      }
+      const bool writes = may_write();
+      if (report_.waits_for_others) {
+        report_.status = RepairStatus::not_repairable;
+        return {};
+      }
+      if (!writes) {
         return not_repairable();
       }
     }
@@ -227,7 +235,9 @@ class Repair {
       report_.status = RepairStatus::not_affected;
       if (rotation_only) {
         report_.reasons.emplace_back(
-            "its constants are right, its axes are not: --undo-rotation turns them back");
+            "16CPAN03 does not concern its constants, but its axes are turned: --undo-rotation "
+            "turns "
+            "them back");
       }
       return write_whole();
     }
@@ -295,7 +305,10 @@ class Repair {
       report_.reasons.push_back(map_->why);
     }
     evidence_ = gate_evidence(survey_, map_->calibration, map_->cross_axis);
+    evidence_->refuted_by = options_.refuted_by;
     const GateAnswer answer = gate(*evidence_, options_.force);
+    report_.waits_for_others = options_.leave_unchecked && answer.row == GateRow::not_checked;
+    report_.refutes_constants = refutes(answer.row);
     if (evidence_->directions > 0) {
       report_.still_error_after_mg = evidence_->after_mg;
     }
@@ -307,6 +320,7 @@ class Repair {
       if (auto contradiction = own_still_periods_contradict()) {
         report_.reasons.push_back(*std::move(contradiction));
         report_.forced = true;
+        report_.refutes_constants = true;
       }
     }
     if (report_.forced && options_.force) {

@@ -107,6 +107,11 @@ struct RepairOptions {
   bool resume = false;
   // An output that was made otherwise than it would be made now is replaced.
   bool redo_outdated = false;
+  // A file on which the gate cannot check the constants (it has no still periods) is not written:
+  // its report says that it waits for what they do to the unit's other files.
+  bool leave_unchecked = false;
+  // GateEvidence::refuted_by (gate.h).
+  std::string refuted_by;
   calib::StillBlockOptions still;
   // From so many bytes of log.bin on one pass is tried: below, two are as fast.
   std::uint64_t one_pass_from_bytes = std::uint64_t{4} << 20;

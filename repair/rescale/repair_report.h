@@ -76,6 +76,9 @@ struct RepairReport {
   std::string input_sha256;
   std::string output_sha256;
   bool dry_run = false;
+  // For a run over many files (repair_files.h); not part of the answer.
+  bool waits_for_others = false;   // with RepairOptions::leave_unchecked
+  bool refutes_constants = false;  // as gate.h has it
 
   // "repaired  in.gt3x  still error 112.3 -> 0.8 mg  by store 5c0f91aa (2026-11-22, +- 1.2 mg)"
   std::string brief() const;

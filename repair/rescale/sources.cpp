@@ -65,6 +65,13 @@ std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const
     return "the constants rest on a population prior, not on this unit's data; --allow-prior uses "
            "them all the same";
   }
+  std::string impossible = calib::why_no_sensor(record.calibration);
+  if (impossible.empty() && record.cross_axis) {
+    impossible = calib::why_no_sensor(record.cross_axis->calibration);
+  }
+  if (!impossible.empty()) {
+    return impossible + ": look for a mistake in the constants, or measure the unit anew";
+  }
   return std::nullopt;
 }
 

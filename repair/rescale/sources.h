@@ -58,12 +58,13 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named);
 // | of another serial number                            | no  |
 // | measured under `legacy`                             | no  |
 // | resting on a population prior, without `allow_prior`| no  |
+// | that no sensor can have (calib::why_no_sensor())    | no  |
 // | otherwise                                           | yes |
 std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const FileFacts& file,
                                      bool allow_prior);
 
 // Two sets have one digest when they do the same to a file: serial number, filter, constants and
-// cross-axis terms.// 32 hex digits.
+// cross-axis terms. 32 hex digits.
 std::string digest_of(const calib::ConstantsRecord& record);
 
 // Where the constants of a repair came from, for people.

@@ -43,6 +43,11 @@ void judge(ScannedFile& answer, bool repaired) {
                     "corrected by other software; repair writes it only where that improves it",
                     kEvidenceLimit_mg));
   }
+  if (triage.verdict == Verdict::not_affected && !fits) {
+    answer.reasons.emplace_back(
+        "16CPAN03 is not why they do not fit: the unit may hold another one's constants, or have a "
+        "defect");
+  }
 }
 
 // Where the recording of an .agd may lie: NAME.gt3x beside NAME.agd, and beside NAME60sec.agd,
@@ -75,7 +80,11 @@ void take_date_from_recording(FileSystem& files, ScannedFile& answer) {
 ScannedFile scan_agd(FileSystem& files, const std::string& path, const CalibrationLookup& lookup) {
   const auto facts = read_agd_facts(path);
   if (!facts) {
-    return unreadable_file(path, facts.error());
+    const bool is_recording = facts_of(files, path).has_value();
+    return unreadable_file(
+        path, is_recording ? Error{ErrorCode::bad_data, "this is a .gt3x recording and no .agd",
+                                   path, "give it a name that ends with .gt3x"}
+                           : facts.error());
   }
   ScannedFile answer;
   answer.path = path;

@@ -131,7 +131,7 @@ std::vector<UnitPool::Kept> UnitPool::kept_of(const Survey& survey,
     const calib::StillBlock& block = survey.blocks[i];
     kept.push_back({block.start_time_s, converted<float>(block.mean_lsb),
                     converted<float>(block.sd_lsb), converted<float>(block.ramp_variance_lsb2),
-                    block.samples, block.noisy});
+                    block.samples, static_cast<float>(block.duration_s), block.noisy});
   }
   return kept;
 }
@@ -143,6 +143,7 @@ UnitFile UnitPool::expanded(const std::string& serial, const File& file) {
     calib::StillBlock block;
     block.start_time_s = kept.start_time_s;
     block.samples = kept.samples;
+    block.duration_s = kept.duration_s;
     block.mean_lsb = converted<double>(kept.mean_lsb);
     block.mean_g = file.file_constants.to_g(block.mean_lsb);
     block.sd_lsb = converted<double>(kept.sd_lsb);

@@ -93,6 +93,7 @@ class UnitPool final : public UnitConstants {
     PerAxis<float> sd_lsb{};
     PerAxis<float> ramp_variance_lsb2{};
     int samples = 0;
+    float duration_s = 0;
     bool noisy = false;
   };
   struct File {

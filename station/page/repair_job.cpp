@@ -6,10 +6,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "repair/archive/output_lock.h"
+#include "repair/batch/manifest.h"
+#include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
-#include "repair/rescale/repair_file.h"
 #include "repair/rescale/repair_records.h"
-#include "repair/triage/file_tree.h"
+#include "repair/units/unit_needs.h"
+#include "repair/units/unit_pool.h"
 #include "station/records/software.h"
 
 namespace sixpoint::station {
@@ -33,18 +36,8 @@ std::string store_problem(db::Store& store, const repair::RepairReport& report) 
   return {};
 }
 
-repair::RepairReport repair_one(Env& env, const repair::FoundFile& file, const std::string& folder,
-                                repair::ConstantsSource& constants) {
-  const std::string output = folder + "/" + file.relative;
-  if (const Status made = env.files.make_folders(folder_of(output)); !made) {
-    repair::RepairReport report;
-    report.input = file.path;
-    report.reasons.push_back(made.error().brief());
-    return report;
-  }
-  repair::RepairOptions options;
-  options.resume = true;  // a job that was cancelled goes on
-  return repair::repair_file(env, file.path, output, constants, options);
+std::string name_below(const std::string& folder, const std::string& path) {
+  return path.starts_with(folder + "/") ? path.substr(folder.size() + 1) : file_name_of(path);
 }
 
 // What the page shows of one file.
@@ -57,13 +50,62 @@ Json shown(const std::string& name, const repair::RepairReport& report) {
           {"still_error_mg", all["still_error_mg"]}};
 }
 
+// What a job begins with.
+struct PlannedJob {
+  RepairOrder order;
+  std::unique_ptr<FileLock> lock;  // of the output folder; null where its file system has none
+  std::vector<repair::NamedFile> files;
+};
+
+Result<PlannedJob> plan_job(FileSystem& files, const RepairOrder& order) {
+  SIXPOINT_CHECK(files.info(order.folder));
+  if (!order.calibration_file.empty()) {
+    SIXPOINT_CHECK(repair::check_calibration_recording(files, order.calibration_file));
+  }
+  PlannedJob job{order, nullptr, repair::named_files(files, {order.folder}, {".gt3x"}).files};
+  const auto no_files = fail(ErrorCode::no_input, "there is no .gt3x file in this folder",
+                             order.folder, "choose the folder with your recordings");
+  if (job.files.empty()) {
+    return no_files;
+  }
+  SIXPOINT_CHECK(repair::check_manifest(files, order.output));
+  SIXPOINT_ASSIGN(job.lock, repair::lock_for_repair(files, order.output));
+  repair::leave_out_outputs(files, job.files, order.output);
+  repair::refuse_same_outputs(job.files, order.output);
+  return job.files.empty() ? Result<PlannedJob>(no_files) : std::move(job);
+}
+
+Status leave_manifest(Env& env, const std::string& folder,
+                      const std::vector<repair::RepairReport>& reports, repair::UnitTable& table) {
+  for (const repair::RepairReport& report : reports) {
+    table.add(report);
+  }
+  SIXPOINT_CHECK(
+      repair::write_manifest(env.files, folder, reports, env.clock.now(), software_and_build()));
+  return repair::write_units(env.files, folder, table.rows());
+}
+
 }  // namespace
 
 struct RepairJob::Impl {
   Impl(Env& its_env, StoreOpener opener) : env(its_env), open_store(std::move(opener)) {}
 
-  void work(const std::stop_token& stop, const RepairOrder& order, const repair::FileTree& tree);
-  void add(const std::string& name, const repair::RepairReport& report);  // under the mutex
+  void work(const std::stop_token& stop, PlannedJob job);
+  void begin(std::size_t files) {
+    const std::lock_guard lock(mutex);
+    state = "running";
+    error.clear();
+    total = files;
+    forget_files();
+  }
+  // Under the mutex, as add().
+  void forget_files() {
+    done = 0;
+    summary = Json::object();
+    shown_files = Json::array();
+    ++changes;
+  }
+  void add(const std::string& name, const repair::RepairReport& report);
   void end(std::string how, std::string problem) {
     const std::lock_guard lock(mutex);
     state = std::move(how);
@@ -75,6 +117,7 @@ struct RepairJob::Impl {
   Env& env;
   StoreOpener open_store;
   std::atomic<std::uint64_t> changes{0};
+  std::mutex starting;       // one start() at a time
   mutable std::mutex mutex;  // guards what follows
   std::string state = "none";
   std::string error;
@@ -82,57 +125,74 @@ struct RepairJob::Impl {
   std::size_t done = 0;
   std::size_t total = 0;
   Json summary = Json::object();
-  Json files = Json::array();
+  Json shown_files = Json::array();
   std::jthread thread;
 };
 
 void RepairJob::Impl::add(const std::string& name, const repair::RepairReport& report) {
   const std::string status(repair::to_string(report.status));
   summary[status] = summary.value(status, 0) + 1;
-  if (files.size() < kShownFiles) {
-    files.push_back(shown(name, report));
+  if (shown_files.size() < kShownFiles) {
+    shown_files.push_back(shown(name, report));
   }
+  ++done;
   ++changes;
 }
 
-void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order,
-                           const repair::FileTree& tree) {
+void RepairJob::Impl::work(const std::stop_token& stop, PlannedJob job) {
   Result<db::Store> store = open_store();
   if (!store) {
+    job.lock.reset();
     end("failed", store.error().brief());
     return;
   }
-  repair::ConstantsFinderOptions options;
-  options.store = &*store;
+  const RepairOrder& order = job.order;
+  repair::UnitPool pool;
+  repair::ConstantsFinderOptions sources;
+  sources.store = &*store;
+  sources.unit = &pool;
   if (!order.calibration_file.empty()) {
-    options.calibration_file = order.calibration_file;
+    sources.calibration_file = order.calibration_file;
   }
-  repair::ConstantsFinder finder(env, options);
-  for (const repair::RefusedPath& refused : tree.refused) {
-    repair::RepairReport report;
-    report.reasons.push_back(refused.error.brief());
+  repair::ConstantsFinder finder(env, sources);
+  repair::RepairFilesOptions how;
+  how.folder = order.output;
+  how.repair.resume = true;  // a job that was cancelled goes on
+  how.jobs = 1;              // files come in their order
+  std::atomic<bool> stopping{false};
+  const std::stop_callback on_stop(stop, [&] { stopping = true; });
+  repair::RepairWatch watch;
+  watch.begin = [&](const char* doing, std::size_t /*files*/) {
     const std::lock_guard lock(mutex);
-    add(refused.path, report);
-  }
-  for (const repair::FoundFile& file : tree.files) {
-    if (stop.stop_requested()) {
-      end("cancelled", "");
-      return;
-    }
-    {
-      const std::lock_guard lock(mutex);
-      current = file.relative;
-      ++changes;
-    }
-    repair::RepairReport report = repair_one(env, file, order.output, finder);
+    current = done < total ? name_below(order.folder, job.files[done].path) : doing;
+    ++changes;
+  };
+  watch.did = [&](repair::RepairReport& report) {
     if (const std::string problem = store_problem(*store, report); !problem.empty()) {
       report.reasons.push_back(problem);
     }
     const std::lock_guard lock(mutex);
-    ++done;
-    add(file.relative, report);
+    if (done < total) {  // the first pass
+      add(name_below(order.folder, report.input), report);
+      current = done < total ? name_below(order.folder, job.files[done].path) : "";
+    }
+  };
+  const auto reports = repair::repair_files(env, job.files, how, finder, pool, watch, &stopping);
+  repair::UnitTable table(repair::sources_in_order(sources));
+  const Status left = leave_manifest(env, order.output, reports, table);
+  {
+    const std::lock_guard lock(mutex);
+    forget_files();
+    for (const repair::RepairReport& report : reports) {
+      add(name_below(order.folder, report.input), report);
+    }
   }
-  end("done", "");
+  job.lock.reset();
+  if (!left) {
+    end("failed", left.error().brief());
+  } else {
+    end(reports.size() < job.files.size() ? "cancelled" : "done", "");
+  }
 }
 
 RepairJob::RepairJob(Env& env, StoreOpener open_store)
@@ -140,32 +200,22 @@ RepairJob::RepairJob(Env& env, StoreOpener open_store)
 RepairJob::~RepairJob() = default;
 
 Status RepairJob::start(const RepairOrder& order) {
-  SIXPOINT_ASSIGN(auto tree, repair::find_files(impl_->env.files, order.folder, {{".gt3x"}}));
-  // What an earlier job made lies below the folder when the output does: not repaired again.
-  std::erase_if(tree.files, [&](const repair::FoundFile& file) {
-    return file.path.starts_with(order.output + "/");
-  });
-  const std::lock_guard lock(impl_->mutex);
-  if (impl_->state == "running") {
-    return fail(ErrorCode::usage, "files are being repaired already", {},
-                "wait, or cancel that job");
+  const std::lock_guard starting(impl_->starting);
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (impl_->state == "running") {
+      return fail(ErrorCode::usage, "files are being repaired already", {},
+                  "wait, or cancel that job");
+    }
   }
-  if (tree.files.empty()) {
-    return fail(ErrorCode::no_input, "there is no .gt3x file in this folder", order.folder,
-                "choose the folder with your recordings");
-  }
+  SIXPOINT_ASSIGN(auto job, plan_job(impl_->env.files, order));
   if (impl_->thread.joinable()) {
     impl_->thread.join();  // it has ended: its state says so
   }
-  impl_->state = "running";
-  impl_->error.clear();
-  impl_->done = 0;
-  impl_->total = tree.files.size();
-  impl_->summary = Json::object();
-  impl_->files = Json::array();
-  ++impl_->changes;
-  impl_->thread = std::jthread([this, order, tree = std::move(tree)](const std::stop_token& stop) {
-    impl_->work(stop, order, tree);
+  impl_->begin(job.files.size());
+  const std::lock_guard lock(impl_->mutex);
+  impl_->thread = std::jthread([this, job = std::move(job)](const std::stop_token& stop) mutable {
+    impl_->work(stop, std::move(job));
   });
   return {};
 }
@@ -185,7 +235,7 @@ Json RepairJob::to_json() const {
   json["total"] = impl_->total;
   json["current"] = printable(impl_->current);
   json["summary"] = impl_->summary;
-  json["files"] = impl_->files;
+  json["files"] = impl_->shown_files;
   json["error"] = impl_->error;
   return json;
 }

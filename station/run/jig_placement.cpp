@@ -20,10 +20,6 @@ constexpr int kRawMax = 2047;
 constexpr double kLeastNoise_lsb = 0.5;
 constexpr double kSamePlacement_g =
     0.01;  // 0.6 degree: a person does not repeat a placement so well
-// What a working ADXL362 can have (datasheet, and the effect of the two filter configurations).
-constexpr double kLeast_lsb_per_g = 150;
-constexpr double kMost_lsb_per_g = 350;
-constexpr double kMostZero_g = 0.75;
 // The mean of the units whose constants are known.
 constexpr double kNominal_lsb_per_g = 256;
 constexpr double kNominalZero_lsb = 40;
@@ -33,17 +29,6 @@ constexpr double kLeastChange_lsb_per_g = kNominal_lsb_per_g / 4;
 constexpr double kMostChange_lsb_per_g = kNominal_lsb_per_g * 2;
 constexpr double kMostLevelChange_lsb = kNominal_lsb_per_g / 2;
 constexpr double kMostFirstZero_g = 1.2;
-
-bool is_possible(const calib::Calibration& calibration) {
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double lsb_per_g = 1 / calibration.sensitivity_g_per_lsb[axis];
-    if (!(lsb_per_g >= kLeast_lsb_per_g && lsb_per_g <= kMost_lsb_per_g &&
-          std::abs(calibration.zero_lsb[axis]) <= kMostZero_g * lsb_per_g)) {
-      return false;
-    }
-  }
-  return true;
-}
 
 bool is_clipped(int count) { return count <= kRawMin || count >= kRawMax; }
 
@@ -68,7 +53,8 @@ NearestFace nearest_face(const PerAxis<double>& force_g) {
 
 FirstApproximation first_approximation(const std::optional<StoredConstants>& stored) {
   if (stored) {
-    if (const auto own = calib::calibration_from(*stored); own && is_possible(*own)) {
+    if (const auto own = calib::calibration_from(*stored);
+        own && calib::why_no_sensor(*own).empty()) {
       return {*own, false};
     }
   }

@@ -223,8 +223,7 @@ struct JigLive {
 };
 
 // The constants that recognise a unit's faces before the first reading: the stored ones where a
-// working ADXL362 can have them (150 to 350 LSB/g, zero within 0.75 g: the datasheet's limits and
-// the effect of the two filter configurations), nominal ones otherwise.
+// working sensor can have them (calib::why_no_sensor()), nominal ones otherwise.
 struct FirstApproximation {
   calib::Calibration calibration;
   bool is_nominal = true;

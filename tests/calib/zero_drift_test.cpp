@@ -23,6 +23,7 @@ std::vector<DriftPoint> drifting(const PerAxis<double>& half_span_mg, int rounds
     for (int k = 0; k < 15; ++k) {
       DriftPoint point;
       point.time_s = 70.0 * side + 4.0 * k;
+      point.duration_s = 4;
       point.direction = side % 6;
       const tests::Vector& n = tests::kSixSides[static_cast<std::size_t>(side % 6)];
       for (std::size_t a = 0; a < kAxes; ++a) {
@@ -47,8 +48,21 @@ TEST(ZeroDrift, ALineIsMeasuredAndShown) {
     EXPECT_NEAR(drift->half_span_mg[a], rates[a], 3 * drift->standard_uncertainty_mg[a]) << a;
     EXPECT_LT(drift->standard_uncertainty_mg[a], 2) << a;
   }
-  EXPECT_NEAR(drift->at_rest_s, 12 * 14 * 4, 1e-9);
+  EXPECT_NEAR(drift->at_rest_s, 12 * 15 * 4, 1e-9) << "fifteen blocks of 4 s a side";
   EXPECT_GT(drift->shown_mg(), std::sqrt(36 + 64 + 16) / 2);
+}
+
+// What the clock jumps over while the unit lies on one side was not sampled.
+TEST(ZeroDrift, AJumpOfTheClockIsNoTimeAtRest) {
+  auto points = drifting({0, 0, 0}, 1, 0.3);
+  const double last_s = points.back().time_s;
+  for (std::size_t i = points.size() - 7; i < points.size(); ++i) {
+    points[i].time_s += 3600;
+  }
+  const auto drift = zero_drift(points);
+  ASSERT_TRUE(drift);
+  EXPECT_NEAR(drift->at_rest_s, 6 * 15 * 4, 1e-9);
+  EXPECT_NEAR(drift->within_s, last_s + 3600 + 4, 1e-9);
 }
 
 TEST(ZeroDrift, NoiseAloneIsNoDrift) {

@@ -107,6 +107,35 @@ TEST_F(ArchiveCommand, MissingAndFailedShardsAreNamedWithTheirCommand) {
   EXPECT_EQ(run({"archive", "status", plan_, "--json"}).json()["summary"]["failed"], 1);
 }
 
+TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {
+  fill();
+  std::filesystem::remove(archive_ + "/sub/broken.gt3x");
+  plan({"--shards", "2"});
+  std::ofstream(archive_ + "/plain.gt3x", std::ios::app) << "x";
+  run_shard(0);
+  run_shard(1);
+  const Answer changed = run({"archive", "merge", plan_});
+  EXPECT_EQ(changed.exit_code, 65);
+  EXPECT_THAT(changed.people, HasSubstr("1 of its "));
+  EXPECT_THAT(changed.people, HasSubstr("changed since the plan was made"));
+  EXPECT_THAT(changed.people, HasSubstr("make another plan"));
+  EXPECT_THAT(changed.people, testing::Not(HasSubstr("archive run")));
+  const Json shards = merge().json()["shards"];
+  for (const Json& shard : shards) {
+    EXPECT_TRUE(shard["rerun"].is_null()) << shard;
+  }
+  // A result that is damaged is another matter.
+  std::ofstream(plan_ + "/results/00000.jsonl", std::ios::app) << "x";
+  EXPECT_THAT(run({"archive", "merge", plan_}).people,
+              HasSubstr("archive run " + plan_ + " --shard 0"));
+  std::ofstream(plan_ + "/shards/00000.jsonl", std::ios::app) << "x";
+  const Answer damaged = run({"archive", "merge", plan_});
+  EXPECT_EQ(damaged.exit_code, 65);
+  EXPECT_THAT(damaged.people, HasSubstr("shard 0: its list of "));
+  EXPECT_THAT(damaged.people, HasSubstr("make another plan"));
+  EXPECT_THAT(damaged.people, testing::Not(HasSubstr("archive run")));
+}
+
 TEST_F(ArchiveCommand, TheSlurmScriptRunsOneShardPerTask) {
   plan_ = folder_ / "it's a\nplan; exit 9";
   out_ = folder_ / "out put";

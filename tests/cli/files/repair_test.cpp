@@ -272,6 +272,28 @@ TEST_F(RepairCommand, WhatWasMadeOtherwiseIsOutdatedAndReplacedWhenAsked) {
   EXPECT_EQ(repair({"--scan", "--resume"}).exit_code, 0);
 }
 
+// The input was replaced after its output was made: that it failed stands in the manifest, and what
+// is advised is no command that refuses the pair.
+TEST_F(RepairCommand, WhatFailedStandsInTheManifestAndInTheNextStep) {
+  const auto repair = [&](const char* resume) {
+    return run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", resume});
+  };
+  const auto first = repair("--wide");
+  EXPECT_THAT(first.people, HasSubstr("sixpoint impact"));
+  MadeRecording other = half_hour();
+  other.start += 3600;
+  ASSERT_OK(other.write(files_, archive_ + "/affected.gt3x"));
+  const auto again = repair("--resume");
+  EXPECT_EQ(again.exit_code, 73);
+  EXPECT_THAT(again.people, testing::Not(HasSubstr("sixpoint impact")));
+  EXPECT_THAT(again.people, HasSubstr("1 of the files failed; do what their lines say"));
+  EXPECT_THAT(again.people, HasSubstr("sixpoint repair " + archive_ + " -o " + out_));
+  const Json file = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"][0];
+  EXPECT_EQ(file["input"], archive_ + "/affected.gt3x");
+  EXPECT_EQ(file["status"], "failed");
+  EXPECT_TRUE(file["output"].is_null());
+}
+
 // A file that would not be written now, and an earlier run's output of it: both are said.
 TEST_F(RepairCommand, AnOutputThatWouldNotBeWrittenNowIsOutdated) {
   std::string wrong = kConstants;

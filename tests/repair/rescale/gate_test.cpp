@@ -39,6 +39,33 @@ TEST(Gate, WithoutStillPeriodsNothingCanBeChecked) {
   }
 }
 
+TEST(Gate, WhatAnotherFileOfTheUnitRefutesIsNotWritten) {
+  GateEvidence evidence;
+  evidence.refuted_by = "day1.gt3x";
+  for (const bool force : {false, true}) {
+    const GateAnswer answer = gate(evidence, force);
+    EXPECT_EQ(answer.row, GateRow::refuted);
+    EXPECT_EQ(answer.write, force);
+    EXPECT_EQ(answer.forced, force);
+    EXPECT_THAT(answer.reason, HasSubstr("day1.gt3x, of the same unit"));
+    EXPECT_THAT(answer.reason, HasSubstr("use other constants"));
+  }
+  evidence = {9, 112, 0.8};
+  evidence.refuted_by = "day1.gt3x";
+  EXPECT_EQ(gate(evidence, false).row, GateRow::helps) << "its own still periods decide";
+}
+
+TEST(Gate, OnlyWhatSpeaksAgainstTheConstantsRefutesThem) {
+  for (const GateRow row : {GateRow::worse, GateRow::too_much_left}) {
+    EXPECT_TRUE(refutes(row));
+  }
+  for (const GateRow row :
+       {GateRow::refuted, GateRow::not_checked, GateRow::no_better, GateRow::rounded_away,
+        GateRow::ambiguous, GateRow::weak, GateRow::helps}) {
+    EXPECT_FALSE(refutes(row));
+  }
+}
+
 TEST(Gate, WhatGetsWorseIsNotWritten) {
   expect_refused({9, 12.25, 84.25}, GateRow::worse);
   expect_refused({9, 70.25, 70.75}, GateRow::worse);

@@ -117,6 +117,7 @@ TEST(ScanFile, SamplesNeverChangeTheVerdict) {
   const ScannedFile file = scanned(made);
   EXPECT_EQ(file.verdict, "not_affected") << "250 mg off for another reason";
   EXPECT_THAT(file.reasons, Contains(HasSubstr("the constants do not fit the data")));
+  EXPECT_THAT(file.reasons, Contains(HasSubstr("16CPAN03 is not why they do not fit")));
 }
 
 TEST(ScanFile, SaysWhereTheSamplesGiveNoEvidence) {
@@ -206,6 +207,16 @@ TEST(ScanFile, WhatCannotBeReadIsAnAnswerToo) {
     EXPECT_THAT(file.reasons[0], AllOf(HasSubstr(file.error->what), HasSubstr(file.error->hint)));
     EXPECT_THAT(file.reasons[0], Not(HasSubstr(path))) << "the line names the file already";
   }
+}
+
+TEST(ScanFile, ARecordingThatIsCalledAgdIsSaidToBeOne) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  ASSERT_OK(at_rest(256).write(files, folder / "recording.agd"));
+  const ScannedFile file = scan_file(files, folder / "recording.agd");
+  EXPECT_EQ(file.verdict, "unreadable");
+  EXPECT_THAT(file.error->what, HasSubstr("this is a .gt3x recording"));
+  EXPECT_THAT(file.error->hint, HasSubstr("ends with .gt3x"));
 }
 
 // Oracles: the publishers' own words on these files (../shared/data/PROVENANCE.md).

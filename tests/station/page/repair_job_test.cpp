@@ -6,8 +6,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/archive/output_lock.h"
 #include "repair/made_recording.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_records.h"
@@ -101,6 +104,72 @@ TEST(RepairJobTest, RefusesASecondJobAndAnEmptyFolder) {
   Machine machine;
   RepairJob job(machine.memory.env, [&] { return machine.open(); });
   EXPECT_FAILS(job.start({"none", "out", ""}), ErrorCode::no_input);
+  EXPECT_EQ(job.to_json()["state"], "none");
+}
+
+TEST(RepairJobTest, HoldsTheLockOfTheCommandAndLeavesItsManifest) {
+  Machine machine;
+  // Whether the folder is locked whenever the recording or the manifest is opened.
+  class Looking final : public ForwardingFiles {
+   public:
+    explicit Looking(FileSystem& files) : ForwardingFiles(files), files_(files) {}
+    Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
+      look(path);
+      return ForwardingFiles::open(path);
+    }
+    Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+      look(path);
+      return ForwardingFiles::create(path);
+    }
+    int locked = 0;
+    int free = 0;
+
+   private:
+    void look(const std::string& path) {
+      if (path == "archive/a.gt3x" || path.starts_with("out/units.csv")) {
+        ++(repair::lock_for_repair(files_, "out") ? free : locked);
+      }
+    }
+    FileSystem& files_;
+  } looking(machine.memory.files);
+  Env env{machine.memory.clock, looking};
+  RepairJob job(env, [&] { return machine.open(); });
+  {
+    const auto command = repair::lock_for_repair(machine.memory.files, "out");
+    ASSERT_OK(command);
+    const auto refused = job.start({"archive", "out", ""});
+    EXPECT_FAILS(refused, ErrorCode::cannot_create);
+    EXPECT_THAT(refused.error().what, testing::HasSubstr("another run is repairing"));
+    EXPECT_THAT(refused.error().hint, testing::HasSubstr("wait for it"));
+    EXPECT_EQ(job.to_json()["state"], "none");
+  }
+  ASSERT_OK(job.start({"archive", "out", ""}));
+  while (job.to_json()["state"] == "running") {
+    std::this_thread::yield();
+  }
+  EXPECT_GE(looking.locked, 2) << "while the job is at work";
+  EXPECT_EQ(looking.free, 0);
+  EXPECT_OK(repair::lock_for_repair(machine.memory.files, "out")) << "and not behind it";
+  const Bytes csv = read_file(machine.memory.files, "out/manifest.csv").value();
+  EXPECT_THAT(std::string(csv.begin(), csv.end()),
+              testing::HasSubstr("archive/a.gt3x,out/a.gt3x,repaired,store,"));
+  EXPECT_OK(machine.memory.files.info("out/manifest.json"));
+  EXPECT_OK(machine.memory.files.info("out/units.csv"));
+}
+
+TEST(RepairJobTest, RefusesAtOnceWhatCannotWork) {
+  const sixpoint::tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  ASSERT_OK(files.make_folders(folder / "in"));
+  tests::MadeRecording made;
+  made.raw.assign(300, {61, 4, 340});
+  ASSERT_OK(made.write(files, folder / "in/a.gt3x"));
+  ASSERT_OK(write_file(files, folder / "file", "x"));
+  RepairJob job(posix_env(), [&] { return db::Store::open(posix_env(), folder / "store.db"); });
+  EXPECT_FAILS(job.start({folder / "in", folder / "out", folder / "none.gt3x"}),
+               ErrorCode::no_input);
+  EXPECT_FAILS(job.start({folder / "in", folder / "out", folder / "file"}), ErrorCode::bad_data);
+  EXPECT_FAILS(job.start({folder / "in", folder / "file", ""}), ErrorCode::cannot_create);
   EXPECT_EQ(job.to_json()["state"], "none");
 }
 

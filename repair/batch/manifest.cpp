@@ -1,17 +1,16 @@
-#include "cli/files/manifest.h"
+#include "repair/batch/manifest.h"
 
 #include <map>
 #include <optional>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
 #include "base/text/csv_field.h"
-#include "cli/context.h"
 #include "db/records.h"
-#include "station/records/software.h"
 
-namespace sixpoint::cli {
+namespace sixpoint::repair {
 namespace {
 
 constexpr std::string_view kSchema = "sixpoint/repair-manifest/1";
@@ -37,10 +36,12 @@ Json manifest_in(FileSystem& files, const std::string& folder) {
   return Json::object();
 }
 
-Json entry_of(const repair::RepairReport& report) {
+Json entry_of(const RepairReport& report) {
   const Json all = report.to_json();
-  Json entry = {{"input", db::storable_path(report.input)},
-                {"output", text_or_null(db::storable_path(report.output))}};
+  Json entry = {{"input", db::storable_path(report.input)}, {"output", nullptr}};
+  if (!report.output.empty()) {
+    entry["output"] = db::storable_path(report.output);
+  }
   for (const char* key : {"status", "source", "still_error_mg", "input_sha256", "output_sha256"}) {
     entry[key] = all[key];
   }
@@ -75,21 +76,17 @@ std::string line_of(const Json& entry) {
   return line + "\n";
 }
 
-// Whether what an earlier run wrote is there as it was: this run was refused its name.
-bool left_alone(const repair::RepairReport& report, const Json& earlier) {
-  return report.error && report.error->code == ErrorCode::cannot_create &&
-         earlier.value("output", Json()).is_string();
-}
-
-// What is known of an output that is outdated, and is there as an earlier run wrote it: that run's
-// line, under this run's status. Nothing where that run wrote none.
-std::optional<Json> outdated_entry(const repair::RepairReport& report, const Json& earlier) {
-  if (report.status != repair::RepairStatus::outdated ||
-      !earlier.value("output", Json()).is_string()) {
+// What is known of an output that stays as an earlier run made it of this very input: that run's
+// line, under this run's status. Nothing where there is no such output.
+std::optional<Json> entry_of_earlier_output(const RepairReport& report, const Json& earlier) {
+  const bool stays = report.status == RepairStatus::outdated ||
+                     (report.error && report.error->code == ErrorCode::cannot_create);
+  if (!stays || !earlier.value("output", Json()).is_string() || report.input_sha256.empty() ||
+      earlier.value("input_sha256", Json()) != report.input_sha256) {
     return std::nullopt;
   }
   Json entry = earlier;
-  entry["status"] = repair::to_string(report.status);
+  entry["status"] = to_string(report.status);
   return entry;
 }
 
@@ -117,9 +114,10 @@ Status check_manifest(FileSystem& files, const std::string& folder) {
 }
 
 Status write_manifest(FileSystem& files, const std::string& folder,
-                      const std::vector<repair::RepairReport>& reports, UtcTime now) {
-  std::map<std::string, const repair::RepairReport*> of_this_run;
-  for (const repair::RepairReport& report : reports) {
+                      const std::vector<RepairReport>& reports, UtcTime now,
+                      const std::string& software) {
+  std::map<std::string, const RepairReport*> of_this_run;
+  for (const RepairReport& report : reports) {
     of_this_run.emplace(db::storable_path(report.input), &report);
   }
   Json entries = Json::array();
@@ -130,19 +128,14 @@ Status write_manifest(FileSystem& files, const std::string& folder,
       continue;
     }
     const auto now_too = of_this_run.find(input.get<std::string>());
-    if (now_too != of_this_run.end() && left_alone(*now_too->second, entry)) {
-      of_this_run.erase(now_too);
+    if (now_too == of_this_run.end()) {
       entries.push_back(entry);
-    } else if (auto outdated = now_too == of_this_run.end()
-                                   ? std::nullopt
-                                   : outdated_entry(*now_too->second, entry)) {
+    } else if (auto kept = entry_of_earlier_output(*now_too->second, entry)) {
       of_this_run.erase(now_too);
-      entries.push_back(*std::move(outdated));
-    } else if (now_too == of_this_run.end()) {
-      entries.push_back(entry);
+      entries.push_back(*std::move(kept));
     }
   }
-  for (const repair::RepairReport& report : reports) {
+  for (const RepairReport& report : reports) {
     if (of_this_run.contains(db::storable_path(report.input))) {
       entries.push_back(entry_of(report));
     }
@@ -153,7 +146,7 @@ Status write_manifest(FileSystem& files, const std::string& folder,
   }
   const Json json = {{"schema", kSchema},
                      {"made_at", to_iso8601(now)},
-                     {"software", station::software_and_build()},
+                     {"software", software},
                      {"files", std::move(entries)}};
   SIXPOINT_CHECK(write_file(files, json_of(folder),
                             json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"));
@@ -161,8 +154,8 @@ Status write_manifest(FileSystem& files, const std::string& folder,
 }
 
 Status write_units(FileSystem& files, const std::string& folder,
-                   const std::vector<repair::UnitNeeds>& units) {
-  return write_file(files, units_of(folder), repair::units_csv(units));
+                   const std::vector<UnitNeeds>& units) {
+  return write_file(files, units_of(folder), units_csv(units));
 }
 
-}  // namespace sixpoint::cli
+}  // namespace sixpoint::repair

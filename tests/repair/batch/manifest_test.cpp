@@ -1,4 +1,4 @@
-#include "cli/files/manifest.h"
+#include "repair/batch/manifest.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,19 +8,19 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 
-namespace sixpoint::cli {
+namespace sixpoint::repair {
 namespace {
 
 using testing::HasSubstr;
 
-repair::RepairReport repaired(const std::string& input) {
-  repair::RepairReport report;
+RepairReport repaired(const std::string& input) {
+  RepairReport report;
   report.input = input;
   report.output = "out/" + input;
-  report.status = repair::RepairStatus::repaired;
+  report.status = RepairStatus::repaired;
   report.still_error_before_mg = 112.34567;
   report.still_error_after_mg = 0.8;
-  report.source = repair::SourceUsed{"store", "0123", std::nullopt, 1.5};
+  report.source = SourceUsed{"store", "0123", std::nullopt, 1.5};
   report.input_sha256 = "aa";
   report.output_sha256 = "bb";
   return report;
@@ -33,17 +33,17 @@ class Manifest : public testing::Test {
     const Bytes bytes = read_file(memory_.files, path).value();
     return {bytes.begin(), bytes.end()};
   }
-  void write(const std::vector<repair::RepairReport>& reports) {
+  void write(const std::vector<RepairReport>& reports) {
     ASSERT_OK(check_manifest(memory_.files, "out"));
-    ASSERT_OK(write_manifest(memory_.files, "out", reports, from_unix_seconds(0)));
+    ASSERT_OK(write_manifest(memory_.files, "out", reports, from_unix_seconds(0), "sixpoint"));
   }
   MemoryEnv memory_;
 };
 
 TEST_F(Manifest, HasALinePerFile) {
-  repair::RepairReport refused;
+  RepairReport refused;
   refused.input = "b.gt3x";
-  refused.status = repair::RepairStatus::not_repairable;
+  refused.status = RepairStatus::not_repairable;
   write({repaired("a.gt3x"), refused});
   EXPECT_EQ(text("out/manifest.csv"),
             "input,output,status,source,source_id,still_error_before_mg,still_error_after_mg,"
@@ -68,8 +68,8 @@ TEST_F(Manifest, QuotesAndEscapesNames) {
 
 TEST_F(Manifest, KeepsTheFilesOfEarlierRuns) {
   write({repaired("a.gt3x"), repaired("b.gt3x")});
-  repair::RepairReport again = repaired("b.gt3x");
-  again.status = repair::RepairStatus::outdated;
+  RepairReport again = repaired("b.gt3x");
+  again.status = RepairStatus::outdated;
   write({again, repaired("c.gt3x")});
   const auto json = nlohmann::json::parse(text("out/manifest.json"));
   ASSERT_EQ(json["files"].size(), 3U);
@@ -81,9 +81,9 @@ TEST_F(Manifest, KeepsTheFilesOfEarlierRuns) {
 TEST_F(Manifest, AnOutputThatIsOutdatedKeepsWhatIsKnownOfIt) {
   write({repaired("a.gt3x"), repaired("b.gt3x")});
   const auto outdated = [](const std::string& input) {
-    repair::RepairReport report;
+    RepairReport report;
     report.input = input;
-    report.status = repair::RepairStatus::outdated;
+    report.status = RepairStatus::outdated;
     report.still_error_before_mg = 112.34567;
     report.input_sha256 = "aa";
     return report;
@@ -107,22 +107,29 @@ TEST_F(Manifest, WithoutItsJsonTheCsvIsSaidToBeHalf) {
   EXPECT_THAT(half.error().what, HasSubstr("missing"));
 }
 
-TEST_F(Manifest, ARunThatWasRefusedLeavesTheEarlierLine) {
-  write({repaired("a.gt3x"), repaired("b.gt3x")});
-  const auto failed = [](const std::string& input, ErrorCode code) {
-    repair::RepairReport report;
+// The table of manifest.h: a.gt3x was refused because its output is there, b.gt3x cannot be read,
+// c.gt3x has another input than its output was made of, d.gt3x has no earlier line.
+TEST_F(Manifest, WhatFailedInThisRunStandsAsFailed) {
+  write({repaired("a.gt3x"), repaired("b.gt3x"), repaired("c.gt3x"), repaired("e.gt3x")});
+  const auto failed = [](const std::string& input, ErrorCode code, const std::string& hash) {
+    RepairReport report;
     report.input = input;
-    report.status = repair::RepairStatus::failed;
+    report.status = RepairStatus::failed;
     report.error = Error{code, "", "", ""};
+    report.input_sha256 = hash;
     return report;
   };
-  write({failed("a.gt3x", ErrorCode::cannot_create), failed("b.gt3x", ErrorCode::bad_data),
-         failed("c.gt3x", ErrorCode::cannot_create)});
+  write({failed("a.gt3x", ErrorCode::cannot_create, "aa"),
+         failed("b.gt3x", ErrorCode::bad_data, "aa"),
+         failed("c.gt3x", ErrorCode::cannot_create, "cc"),
+         failed("d.gt3x", ErrorCode::cannot_create, "")});
   EXPECT_THAT(text("out/manifest.csv"),
               testing::EndsWith("output_sha256\r\n"
-                                "a.gt3x,out/a.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
-                                "b.gt3x,,failed,,,,,,\r\n"
-                                "c.gt3x,,failed,,,,,,\r\n"));
+                                "a.gt3x,out/a.gt3x,failed,store,0123,112.346,0.800,aa,bb\r\n"
+                                "e.gt3x,out/e.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                                "b.gt3x,,failed,,,,,aa,\r\n"
+                                "c.gt3x,,failed,,,,,cc,\r\n"
+                                "d.gt3x,,failed,,,,,,\r\n"));
 }
 
 TEST_F(Manifest, LeavesAFileOfThatNameThatIsNotOursAlone) {
@@ -134,4 +141,4 @@ TEST_F(Manifest, LeavesAFileOfThatNameThatIsNotOursAlone) {
 }
 
 }  // namespace
-}  // namespace sixpoint::cli
+}  // namespace sixpoint::repair

@@ -1,0 +1,42 @@
+// What a run of repair leaves in its output folder: manifest.csv for people, manifest.json for
+// programs. One line per file: input, output, status, source of the constants, still error before
+// and after, hashes.
+//
+//   SIXPOINT_CHECK(check_manifest(files, "repaired"));  // before the work
+//   SIXPOINT_CHECK(write_manifest(files, "repaired", reports, now, "sixpoint 0.1.0"));
+//
+// units.csv beside them has a line per unit of the run (repair/units/unit_needs.h).
+//
+// A line says of a file what the last run that met it says. The first row that fits decides:
+//
+// | the file in this run                                | its line                              |
+// |-----------------------------------------------------|---------------------------------------|
+// | not in it                                           | as it was                             |
+// | `outdated`, or `failed` because its output is there | the earlier one under this status     |
+// | (cannot_create); an earlier line has that output,   |                                       |
+// | made of this very input (SHA-256)                   |                                       |
+// | otherwise                                           | of this run alone                     |
+//
+// Names that are no UTF-8 are escaped (\xNN); the CSV is quoted as RFC 4180 has it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "repair/rescale/repair_file.h"
+#include "repair/units/unit_needs.h"
+
+namespace sixpoint::repair {
+
+// cannot_create where one of manifest.json, manifest.csv, units.csv and report.html is there and is
+// not ours.
+Status check_manifest(FileSystem& files, const std::string& folder);
+
+Status write_manifest(FileSystem& files, const std::string& folder,
+                      const std::vector<RepairReport>& reports, UtcTime now,
+                      const std::string& software);
+Status write_units(FileSystem& files, const std::string& folder,
+                   const std::vector<UnitNeeds>& units);
+
+}  // namespace sixpoint::repair
