@@ -169,6 +169,21 @@ void make_papers(Context& context, const JigCommandOptions& options, Outputs& ou
   }
 }
 
+// Papers are made of what the store has (certificate.h, print_rule.h).
+void say_papers_wait(Context& context, const JigCommandOptions& options, const JigDone& done) {
+  std::string papers = options.certificate.empty() ? "" : " -o " + bash_word(options.certificate);
+  papers += options.label.empty() ? "" : " --label " + bash_word(options.label);
+  if (papers.empty()) {
+    return;
+  }
+  context.log().error(
+      "no certificate and no label: the store does not have this run yet; when it has it: "
+      "sixpoint certificate {}{}{}",
+      db::shown_id(done.run_id),
+      options.store.empty() ? "" : " --store " + bash_word(options.store), papers);
+  context.worsen(done.kept->refusal->code);
+}
+
 // The operator's line since the last call, without waiting: u undoes, s or q stops; with a virtual
 // unit, words for the hands (mocks/in_process/virtual_hands.h).
 std::optional<station::OperatorCommand> operator_at_terminal(Context& context,
@@ -405,11 +420,13 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
   if (const Status noted = guard.note_run(record, done.kept && done.kept->in_store()); !noted) {
     context.log().warn("{}", noted.error().brief());
   }
-  if (done.kept) {
-    if (done.kept->in_store() && store) {
+  if (done.kept && done.kept->in_store()) {
+    if (store) {
       SIXPOINT_ASSIGN(record.head, store->head_of_run(record.id));
     }
     make_papers(context, options, outputs, record, done);
+  } else if (done.kept) {
+    say_papers_wait(context, options, done);
   }
   return done;
 }

@@ -129,6 +129,13 @@ Status Operators::disable(const std::string& name) {
     return fail(ErrorCode::no_input, "there is no operator of this name", printable(name, 80),
                 "'sixpoint operator list' names them");
   }
+  if (entries.empty()) {
+    return fail(
+        ErrorCode::configuration,
+        "this is the last operator: without one, everybody may work and sign under any name",
+        printable(name, 80),
+        fmt::format("add another one first; to work without operators remove {}", path_));
+  }
   return write(entries);
 }
 

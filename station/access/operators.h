@@ -74,7 +74,9 @@ class Operators {
   // bytes or looks like another one (blanks at its ends, characters that are not seen), or the PIN
   // is not 4 to 12 digits.
   Status add(const std::string& name, OperatorRole role, const std::string& pin);
-  Status disable(const std::string& name);  // no_input where there is none
+  // no_input where there is none; configuration for the last one: a machine without operators takes
+  // names as they are typed.
+  Status disable(const std::string& name);
 
   // `where`: a browser's session, or any other name of a place.
   Result<Operator> sign_in(const std::string& where, const std::string& name,

@@ -317,19 +317,21 @@ Status write_certificate(FileSystem& files, const std::string& path, const db::R
 }
 
 Result<std::string> label_zpl(const db::RunRecord& run) {
-  const auto refuse = [&](std::string why) {
+  const auto refuse = [&](std::string why, const char* hint) {
     return fail(ErrorCode::bad_data, "no label: " + std::move(why), printable(run.serial, 60),
-                "a label says that the unit holds what was measured: run 'sixpoint jig --write'");
+                hint);
   };
+  constexpr const char* kNotHeld =
+      "a label says that the unit holds what was measured: run 'sixpoint jig --write'";
   SIXPOINT_ASSIGN(const Certificate certificate, certificate_of(run));
   if (!is_passed(certificate.verdict)) {
-    return refuse("the unit did not pass");
+    return refuse("the unit did not pass", "the report says why, and what to do");
   }
   if (!certificate.written || !certificate.as_left) {
-    return refuse("nothing was written into the unit and read back");
+    return refuse("nothing was written into the unit and read back", kNotHeld);
   }
   if (certificate.as_left->stored != certificate.measured) {
-    return refuse("what the unit answered is not what was written");
+    return refuse("what the unit answered is not what was written", kNotHeld);
   }
   const std::string date = to_iso8601(certificate.ended).substr(0, 10);
   const std::string qr = fmt::format("sixpoint:{}:{}", certificate.serial, certificate.run);

@@ -3,7 +3,7 @@
 //
 //   StationGuard guard(env, "data/station/3f2a", limits);
 //   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(opened, "MOS2A45130007", "bench-1"));
-//   SIXPOINT_CHECK(guard.note_run(run, /*is_stored=*/true));  // after it
+//   SIXPOINT_CHECK(guard.note_run(record, /*is_stored=*/true));  // after it
 //
 // The station has an identity of its own: the folder beside its state, one for each store. Its file
 // memory.json holds an identifier that is made once, the names that the station went by, and what

@@ -19,6 +19,8 @@ constexpr std::array<std::string_view, 7> kOutcomes = {"running",           "com
                                                        "too_many_refusals", "stopped",  "unit_gone",
                                                        "sensor_stuck"};
 // The run ends after this many times refusals_in_row in all.
+// The run's own judgement comes first (jig_session.cpp): a unit that failed is not written.
+constexpr const char* kWriting = "the constants are judged, and written if the unit passed";
 constexpr int kMostRefusals = 5;
 // The unit was turned although the turn itself was not in the samples.
 constexpr double kTurned_mg = 300;
@@ -126,7 +128,7 @@ std::vector<JigAction> JigRun::start(double now_s) {
     actions_.push_back({JigAction::Kind::fit, Pose::plus_z, "all six faces are taken"});
   }
   if (progress_.phase == JigPhase::writing) {
-    actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
+    actions_.push_back({JigAction::Kind::write, Pose::plus_z, kWriting});
   } else {
     ask_next_or_end_phase();
   }
@@ -256,7 +258,7 @@ void JigRun::next_phase() {
 void JigRun::write_or_finish() {
   if (options_.write) {
     progress_.phase = JigPhase::writing;
-    actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
+    actions_.push_back({JigAction::Kind::write, Pose::plus_z, kWriting});
   } else {
     finish(JigOutcome::complete, "the run is complete");
   }

@@ -86,6 +86,16 @@ TEST_F(OperatorsTest, WhoWasRemovedIsSignedOut) {
   EXPECT_FAILS(operators_.disable("Ada"), ErrorCode::no_input);
 }
 
+// Without one the machine would ask nobody for a PIN, Ada included.
+TEST_F(OperatorsTest, TheLastOneStays) {
+  add_both();
+  EXPECT_OK(operators_.disable("Eve"));
+  const auto refused = operators_.disable("Ada");
+  EXPECT_FAILS(refused, ErrorCode::configuration);
+  EXPECT_THAT(refused.error().hint, testing::HasSubstr(kFile));
+  EXPECT_EQ(operators_.list()->size(), 1U);
+}
+
 TEST_F(OperatorsTest, AListThatCannotBeReadLetsNobodyWork) {
   EXPECT_OK(memory_.files.make_folders("data"));
   for (const char* text : {"", "{", "[]", R"({"operators": [{"name": "Ada"}]})",
