@@ -36,10 +36,19 @@ Status run_certificate(const CertificateCommandOptions& options, Context& contex
     SIXPOINT_ASSIGN(const std::string label, station::label_zpl(record));
     SIXPOINT_CHECK(write_file(outputs.files(), options.label, label));
   }
-  return print_answer(
+  SIXPOINT_CHECK(print_answer(
       context, options.json, certificate.to_json(),
       fmt::format("{}: {}{}\n", printable(certificate.serial), to_string(certificate.verdict),
-                  options.output.empty() ? "" : ", certificate in " + options.output));
+                  options.output.empty() ? "" : ", certificate in " + options.output)));
+  if (options.output.empty() && options.label.empty()) {
+    std::vector<std::string> next = {"certificate", db::shown_id(record.id), "-o",
+                                     certificate.serial + ".pdf"};
+    if (!options.store.empty()) {
+      next.insert(next.end(), {"--store", options.store});
+    }
+    next_step(context, options.json, next);
+  }
+  return {};
 }
 
 }  // namespace

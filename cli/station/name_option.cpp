@@ -5,6 +5,11 @@
 namespace sixpoint::cli {
 
 Status check_name_option(const char* option, const std::string& text) {
+  if (printable(text, text.size()) !=
+      text) {  // a line break would be another line of a certificate
+    return fail(ErrorCode::usage, "a name has no control characters", option,
+                "give it on one line");
+  }
   const Status taken = db::check_name(text);
   return taken ? Status() : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
 }

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <cstdlib>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include <fmt/format.h>
@@ -355,7 +356,12 @@ Result<std::unique_ptr<FileLock>> lock_of_station(const std::string& folder, Con
 }
 
 Status serve(const StationCommandOptions& options, Context& context) {
+  std::set<std::string> named;
   for (const std::string& device : options.devices) {
+    if (!named.insert(device).second) {
+      return fail(ErrorCode::usage, "two lanes cannot have one unit",
+                  "--device " + printable(device), "name each device once");
+    }
     SIXPOINT_CHECK(refuse_of_replay(device, "--device " + printable(device)));
     SIXPOINT_CHECK(station::check_address(device, context.env));
   }

@@ -204,6 +204,10 @@ Result<SignedName> Operators::who(const std::string& where, const std::string& t
                                   OperatorRole needed) {
   SIXPOINT_ASSIGN(const auto entries, read());
   if (entries.empty()) {
+    if (printable(typed, typed.size()) != typed) {
+      return fail(ErrorCode::bad_data, "a name has no control characters", printable(typed, 80),
+                  "type it on one line");
+    }
     return SignedName{typed, false};
   }
   const std::lock_guard lock(mutex_);

@@ -71,7 +71,8 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
       << "the unit is never turned: inconclusive";
   EXPECT_EQ(code_of({}), 64);
   for (const char* option : {"--station", "--jig-id", "--operator"}) {
-    for (const std::string& name : {std::string("bench \xff"), std::string(201, 'x')}) {
+    for (const std::string& name :
+         {std::string("bench \xff"), std::string(201, 'x'), std::string("Ada\nEve")}) {
       EXPECT_EQ(code_of({"--device", kDevice, "--jig", "virtual", option, name}), 64) << option;
     }
   }

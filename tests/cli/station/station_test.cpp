@@ -95,6 +95,9 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
        {"nonsense", "serial:1", "virtual:foo=1", "virtual:seed=-1", "replay:a.zip,match=so"}) {
     EXPECT_EQ(with({"--device", device}).exit_code, 64) << device;
   }
+  // Two lanes would take the unit from each other.
+  EXPECT_THAT(with({"--device", "virtual:seed=7", "--device", "virtual:seed=7"}).people,
+              HasSubstr("name each device once"));
   EXPECT_FALSE(std::filesystem::exists(path("state"))) << "nothing is made before";
   std::vector<std::string> seventeen;
   for (int i = 0; i < 17; ++i) {

@@ -86,6 +86,13 @@ TEST_F(OperatorsTest, WhoWasRemovedIsSignedOut) {
   EXPECT_FAILS(operators_.disable("Ada"), ErrorCode::no_input);
 }
 
+TEST_F(OperatorsTest, ATypedNameHasOneLine) {
+  EXPECT_EQ(operators_.who("a", "Zo\u00eb", OperatorRole::technician)->name, "Zo\u00eb");
+  for (const char* name : {"Ada\nEve", "Ada\x1b[2J"}) {
+    EXPECT_FAILS(operators_.who("a", name, OperatorRole::technician), ErrorCode::bad_data);
+  }
+}
+
 // Without one the machine would ask nobody for a PIN, Ada included.
 TEST_F(OperatorsTest, TheLastOneStays) {
   add_both();
