@@ -107,6 +107,13 @@ std::string catch_up_line(const std::string& location) {
          (location.empty() ? "" : " --store " + (file.empty() ? "STORE" : bash_word(location)));
 }
 
+std::vector<std::string> with_store(std::vector<std::string> words, const std::string& location) {
+  if (!location.empty()) {
+    words.insert(words.end(), {"--store", location});
+  }
+  return words;
+}
+
 Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
                                const std::function<Status(db::RecordWriter&)>& work) {

@@ -12,6 +12,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "calib/constants.h"
 #include "calib/solve.h"
@@ -63,6 +64,9 @@ std::string journal_folder(const std::string& location);
 // The command that stores what waits in that journal. A server's address is left out: it may hold a
 // password.
 std::string catch_up_line(const std::string& location);
+
+// For next_step(): the command's words, with --store where `location` was named.
+std::vector<std::string> with_store(std::vector<std::string> words, const std::string& location);
 
 // Calls `work` with the store, or with the journal where the store fails (db/save.h). `store` is
 // the result of open_store().

@@ -41,12 +41,10 @@ Status run_certificate(const CertificateCommandOptions& options, Context& contex
       fmt::format("{}: {}{}\n", printable(certificate.serial), to_string(certificate.verdict),
                   options.output.empty() ? "" : ", certificate in " + options.output)));
   if (options.output.empty() && options.label.empty()) {
-    std::vector<std::string> next = {"certificate", db::shown_id(record.id), "-o",
-                                     certificate.serial + ".pdf"};
-    if (!options.store.empty()) {
-      next.insert(next.end(), {"--store", options.store});
-    }
-    next_step(context, options.json, next);
+    next_step(
+        context, options.json,
+        with_store({"certificate", db::shown_id(record.id), "-o", certificate.serial + ".pdf"},
+                   options.store));
   }
   return {};
 }

@@ -518,12 +518,9 @@ void print_jig(Context& context, const JigCommandOptions& options, const JigDone
   }
   if (report.usable() && options.study.empty() && !is_replay(options.device) && !done.certified &&
       done.kept->in_store()) {
-    std::vector<std::string> next = {"certificate", db::shown_id(done.run_id), "-o",
-                                     report.serial + ".pdf"};
-    if (!options.store.empty()) {
-      next.insert(next.end(), {"--store", options.store});
-    }
-    next_step(context, options.json, next);
+    next_step(context, options.json,
+              with_store({"certificate", db::shown_id(done.run_id), "-o", report.serial + ".pdf"},
+                         options.store));
   }
 }
 
