@@ -72,7 +72,7 @@ constexpr CommandExamples kExamples[] = {
         "sixpoint operator list --json"}},
     {"operator disable", {
         "sixpoint operator disable Ada",
-        "sixpoint operator disable Eve --json"}},
+        "sixpoint operator disable Eve --json  # exits with 78: the last one stays"}},
     {"statistics", {
         "sixpoint statistics --by station",
         "sixpoint statistics --by operator --from 2024-01-01 --html statistics.html"}},
