@@ -6,6 +6,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 
 namespace sixpoint::cli {

@@ -16,7 +16,6 @@ constexpr double kSlowNoise_nats = 12;
 constexpr double kUnknownScatter_sd = 3;  // added to an unknown scatter's own
 // The form of a filter or mount is known to one per cent: within that nothing else is concluded.
 constexpr double kKnownForm = 0.01;
-constexpr double kKnownRinging = 0.03;  // share of the ringing's own test
 
 // Chi-square of the means, as a whole and by segments.
 void test_means(const Request& request, const Explanation& explanation, bool truncated,

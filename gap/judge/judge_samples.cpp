@@ -146,8 +146,7 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
   Findings found;
   // Truncation changes noise about zero. What a strong line leaves where its frequency wanders is
   // neither noise nor another cause.
-  constexpr double kStrongLines = 0.1;    // share of the noise's variance
-  constexpr double kKnownRinging = 0.03;  // share of the ringing's own test, as in test_settling()
+  constexpr double kStrongLines = 0.1;  // share of the noise's variance
   const double white_mg =
       *std::min_element(records.noise.white_mg.begin(), records.noise.white_mg.end());
   if (before.accepted("truncation") ||

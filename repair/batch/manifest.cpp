@@ -13,6 +13,8 @@
 namespace sixpoint::repair {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr std::string_view kSchema = "sixpoint/repair-manifest/1";
 constexpr std::string_view kColumns =
     "input,output,status,source,source_id,still_error_before_mg,still_error_after_mg,input_sha256,"
