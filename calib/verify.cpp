@@ -139,8 +139,7 @@ void check_uncertainty(const BlockFit& fit, Verification& out) {
   if (hides) {
     out.reasons.push_back(fmt::format(
         "the unit lay still for {:.1f} min in all, spread over {:.1f} min by the recording's "
-        "clock, "
-        "which does not rule out that its zeros drifted meanwhile: {:.1f} mg in the worst "
+        "clock, which does not rule out that its zeros drifted meanwhile: {:.1f} mg in the worst "
         "direction could not be told from "
         "constants (limit {:.1f} mg); lay it on its six sides one right after another for two "
         "minutes each, or lay it on the first side again at the end and go round all six a second "

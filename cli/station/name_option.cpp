@@ -5,8 +5,8 @@
 namespace sixpoint::cli {
 
 Status check_name_option(const char* option, const std::string& text) {
-  if (printable(text, text.size()) !=
-      text) {  // a line break would be another line of a certificate
+  // A line break would be another line of a certificate.
+  if (printable(text, text.size()) != text) {
     return fail(ErrorCode::usage, "a name has no control characters", option,
                 "give it on one line");
   }

@@ -65,9 +65,9 @@ class Explanation {
     double tau_s = 0;
   };
   // Of an effect of the best explanation, or of any other added to it. Each effect that does not
-  // bend has the prior of its full size, whatever size it was found by: numbers that the data leave open, as six faces
-  // leave a turn about (1, 1, 1) between tilt, misalignment and cross-axis terms, are as uncertain
-  // as the catalogue leaves them.
+  // bend has the prior of its full size, whatever size it was found by: numbers that the data leave
+  // open, as six faces leave a turn about (1, 1, 1) between tilt, misalignment and cross-axis terms,
+  // are as uncertain as the catalogue leaves them.
   std::optional<Estimate> estimate(const std::string& effect) const;
   // Effects of the best explanation that leave the numbers of this one open: without one of them
   // its standard uncertainty, which is half of its smallest realistic size and more, would be a

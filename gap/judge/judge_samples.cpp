@@ -153,7 +153,7 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
       records.lines.power_mg2 > kStrongLines * white_mg * white_mg) {
     return found;
   }
-  // The distribution of these is known by theory: thirty tests that alarm at 4.5 sd do so by chance
+  // The distribution of these is known by theory: forty tests that alarm at 4.5 sd do so by chance
   // once in ten thousand bundles.
   constexpr double kExactAlarm_sd = 4.5;
   // Beside a line, of which something may be left, they count as any other test.

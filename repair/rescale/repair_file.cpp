@@ -236,8 +236,7 @@ class Repair {
       if (rotation_only) {
         report_.reasons.emplace_back(
             "16CPAN03 does not concern its constants, but its axes are turned: --undo-rotation "
-            "turns "
-            "them back");
+            "turns them back");
       }
       return write_whole();
     }
