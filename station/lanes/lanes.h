@@ -54,7 +54,7 @@ struct RunLabels {
 // What became of a run that was to be stored.
 struct RunInStore {
   RunIds ids;
-  bool is_kept_here = false;           // the store did not take it; it goes there before the next one
+  bool is_kept_here = false;           // not in the store; it goes there with the next one
   std::vector<std::string> documents;  // that can be asked for: "certificate.pdf" ...
 };
 // Puts a run into the store.
