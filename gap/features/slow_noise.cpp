@@ -302,7 +302,8 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   slow.modes = records.modes;
   slow.jump_nats = records.pieces.jump_over_noise();
   slow.free_nats = free_spectrum_nats(coefficients);
-  slow.walk_mg = {0, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16, 0.2, 0.25, 0.3, 0.38, 0.5, 0.8};
+  slow.walk_mg = {0,   0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16,
+                  0.2, 0.25, 0.3,  0.38,  0.5,   0.8,  1.3};
   slow.flicker_mg = {0, 0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2.2};
   const auto log_likelihood = [&](double walk_mg, double flicker_mg) {
     double sum = 0;

@@ -114,6 +114,7 @@ Diagnosis diagnose_records(const Request& request, const ProtocolKind& kind, con
   out.unit.gain = nuisances.unit.gain;
   out.unit.offset_g = nuisances.unit.offset_g;
   found.append(std::move(nuisances.found));
+  undo_later_effects(found);
   found.append(judge_left_over(request, records, explanation, found));
 
   list_not_observable(request, kind, records, explanation, found, out);

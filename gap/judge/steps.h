@@ -110,6 +110,19 @@ struct Nuisances {
 // `judged`: false where gains and offsets are only estimated (few or wrong poses, raw counts).
 Nuisances judge_nuisances(const Request& request, const ForwardState& state, bool judged);
 
+// undo_later_effects.cpp: sizes as they were before an accepted effect that acts later changed them. How
+// much they add to the recording stays.
+//
+// | accepted later effect  | effect                             | parameter      | answer               |
+// |------------------------|------------------------------------|----------------|----------------------|
+// | filter_mismatch        | settling                           | amplitude      | over the mode's gain |
+// |                        | floor_vibration                    | vector_mg      | the same             |
+// | clock_error            | floor_vibration, electrical_line   | frequency_hz   | times 1 + ppm / 1e6  |
+// | any other, or none     | any                                | any            | as it was measured   |
+//
+// What the means show is explained beside gains already; a line of the supply is added behind the mode.
+void undo_later_effects(Findings& found);
+
 // judge_left_over.cpp, judge_samples.cpp: what the explanation leaves, against chance. Ringing that is
 // named is known to this share of its own test.
 inline constexpr double kKnownRinging = 0.03;

@@ -93,21 +93,51 @@ void hold_step(HeldSigns& held, const Eigen::Vector3d& step_g) {
   }
 }
 
-double Bundle::temperature_at(double host_time_s) const {
-  if (!temperature.empty()) {
-    const auto& t = temperature.host_time_s;
-    const auto after = std::lower_bound(t.begin(), t.end(), host_time_s);
-    if (after == t.begin()) {
-      return temperature.temperature_c.front();
+namespace {
+
+// Whether the command jumps between the two times, from one segment to the next.
+bool command_jumps(const Bundle& bundle, double from_s, double to_s) {
+  constexpr double kJump_c = 2;
+  for (std::size_t i = 1; i < bundle.segments.size(); ++i) {
+    const Segment& segment = bundle.segments[i];
+    if (segment.host_start_s > from_s && segment.host_start_s <= to_s &&
+        std::abs(segment.temperature_start_c - bundle.segments[i - 1].temperature_end_c) >
+            kJump_c) {
+      return true;
     }
-    if (after == t.end()) {
-      return temperature.temperature_c.back();
-    }
-    const auto i = static_cast<std::size_t>(after - t.begin());
-    const double step = t[i] - t[i - 1];
-    const double share = step > 0 ? (host_time_s - t[i - 1]) / step : 0;
-    return temperature.temperature_c[i - 1] * (1 - share) + temperature.temperature_c[i] * share;
   }
+  return bundle.segments.empty();
+}
+
+}  // namespace
+
+double Bundle::temperature_at(double host_time_s) const {
+  constexpr double kPause_s = 60;
+  if (temperature.empty()) {
+    return commanded_c(host_time_s);
+  }
+  const auto& t = temperature.host_time_s;
+  const auto& logged_c = temperature.temperature_c;
+  const auto after = std::lower_bound(t.begin(), t.end(), host_time_s);
+  if (after == t.begin() || after == t.end()) {
+    const std::size_t nearest = after == t.begin() ? 0 : t.size() - 1;
+    const auto [from_s, to_s] = std::minmax(t[nearest], host_time_s);
+    return command_jumps(*this, from_s, to_s)
+               ? logged_c[nearest]
+               : logged_c[nearest] + commanded_c(host_time_s) - commanded_c(t[nearest]);
+  }
+  const auto i = static_cast<std::size_t>(after - t.begin());
+  const double step_s = t[i] - t[i - 1];
+  const double share = step_s > 0 ? (host_time_s - t[i - 1]) / step_s : 0;
+  const double line_c = logged_c[i - 1] * (1 - share) + logged_c[i] * share;
+  if (step_s <= kPause_s || command_jumps(*this, t[i - 1], t[i])) {
+    return line_c;
+  }
+  const double commanded_line_c = commanded_c(t[i - 1]) * (1 - share) + commanded_c(t[i]) * share;
+  return line_c + commanded_c(host_time_s) - commanded_line_c;
+}
+
+double Bundle::commanded_c(double host_time_s) const {
   const Segment* segment = &segments.front();
   for (const Segment& candidate : segments) {
     if (candidate.host_start_s <= host_time_s) {

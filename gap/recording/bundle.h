@@ -103,9 +103,22 @@ struct Bundle {
   HostClock host_clock;
   std::vector<std::string> losses;  // what is missing, and what can't be found without it
 
-  // The unit's temperature at a host time: its own log, smoothed over half a minute; without one
-  // the commanded temperature.
+  // The unit's temperature at a host time. Without a log: the commanded one. Else by the log, smoothed over half a
+  // minute, and what the command did since:
+  //
+  // | the two readings about that time  | the command between them   | answer                                |
+  // |-----------------------------------|----------------------------|---------------------------------------|
+  // | at most a minute apart            | any                        | on the line between them              |
+  // | more                              | jumps by more than 2 C     | the same                              |
+  // | more                              | does not                   | the line, and by how much the command |
+  // |                                   |                            | differs from the line of its own      |
+  // | only one, before or after it all  | jumps by more than 2 C     | that reading                          |
+  // | only one                          | does not                   | that reading and the command's change |
+  //
+  // A unit follows a ramp within minutes; after a jump of the command nobody knows where it is.
   double temperature_at(double host_time_s) const;
+  // What the protocol commands: within a segment on the line from its start to its end, behind it its end.
+  double commanded_c(double host_time_s) const;
   // Specific force of gravity in the sensor's frame during a segment, g.
   Eigen::Vector3d gravity_in_sensor(const Segment& segment) const {
     return gravity_g * segment.rotation.col(2);

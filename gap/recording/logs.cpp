@@ -164,8 +164,8 @@ void check_logs(Bundle& bundle) {
   const std::size_t all = bundle.segments.size();
   if (unlogged > 0) {
     bundle.losses.push_back(fmt::format(
-        "temperature.csv does not cover {} of {} segments: its nearest reading is used, "
-        "effects of temperature are told from effects of time less well",
+        "temperature.csv does not cover {} of {} segments: there its nearest reading and what was "
+        "commanded are used, effects of temperature are told from effects of time less well",
         unlogged, all));
   }
   if (far > 0) {

@@ -53,6 +53,50 @@ TEST(Diagnose, FlickerHasASizeBetweenThoseThatAreTriedAndItsFloor) {
   EXPECT_FALSE(scenario["effects"][0]["parameters"].contains("floor_mg"));
 }
 
+// Oracle: the sizes that the simulator is told. Both act before the gain of the mode and the clock.
+TEST(Diagnose, WhatActsBeforeAWrongModeAndAClockHasTheSizeItHadThere) {
+  constexpr double kGain = 0.75;
+  const nlohmann::json effects = {
+      {{"name", "filter_mismatch"},
+       {"parameters", {{"gain", kGain}, {"offset_g", {0.12, -0.15, 0.1}}}}},
+      {{"name", "clock_error"}, {"parameters", {{"ppm", 3000}}}},
+      {{"name", "settling"}, {"parameters", {{"amplitude", 0.04}}}},
+      {{"name", "floor_vibration"},
+       {"parameters", {{"vector_mg", {3, -2, 4}}, {"frequency_hz", 21.3}}}}};
+  const auto bundle = tests::simulated({{"schema", "sixpoint/scenario/1"},
+                                        {"seed", 8},
+                                        {"protocol", "production"},
+                                        {"effects", effects}});
+  ASSERT_OK(bundle);
+  const auto found = diagnose(*bundle, {});
+  ASSERT_OK(found);
+  const NamedValue* ringing = parameter_of(*found, "settling", "amplitude");
+  ASSERT_NE(ringing, nullptr) << found->brief();
+  EXPECT_NEAR(ringing->value[0], 0.04, 0.05 * 0.04);
+  const NamedValue* line = parameter_of(*found, "floor_vibration", "vector_mg");
+  ASSERT_NE(line, nullptr) << found->brief();
+  const double size_mg = std::hypot(line->value[0], line->value[1], line->value[2]);
+  EXPECT_NEAR(size_mg, std::sqrt(29.0), 0.05 * std::sqrt(29.0));
+  const NamedValue* frequency = parameter_of(*found, "floor_vibration", "frequency_hz");
+  ASSERT_NE(frequency, nullptr) << found->brief();
+  EXPECT_NEAR(frequency->value[0], 21.3, 2 * frequency->sd[0]) << "the unit's clock has 21.236 Hz";
+}
+
+// Oracle: as above. A walk may be larger than realistic ones are.
+TEST(Diagnose, AWalkBeyondTheRealisticOnesHasItsSize) {
+  const auto bundle = tests::simulated(
+      {{"schema", "sixpoint/scenario/1"},
+       {"seed", 3},
+       {"protocol", "production"},
+       {"effects", {{{"name", "random_walk"}, {"parameters", {{"mg_per_sqrt_s", 0.9}}}}}}});
+  ASSERT_OK(bundle);
+  const auto found = diagnose(*bundle, {});
+  ASSERT_OK(found);
+  const NamedValue* size = parameter_of(*found, "random_walk", "mg_per_sqrt_s");
+  ASSERT_NE(size, nullptr) << found->brief();
+  EXPECT_NEAR(size->value[0], 0.9, 3 * size->sd[0]);
+}
+
 TEST(Diagnose, NothingMissingNoAlarm) {
   for (unsigned seed = 1; seed <= (tests::kSanitized ? 3U : 12U); ++seed) {
     tests::MadeUnit unit;

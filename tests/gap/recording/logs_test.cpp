@@ -2,6 +2,7 @@
 #include "gap/recording/logs.h"
 
 #include <algorithm>
+#include <array>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -279,6 +280,34 @@ TEST(Logs, PracticeBundlesLogsAreReadWhole) {
   EXPECT_NEAR(bundle.temperature.temperature_c[20], 23, 0.1);
   EXPECT_EQ(bundle.host_clock.sample_index.size(), 4'485U);
   EXPECT_EQ(bundle.host_clock.host_time_s[2], 35.1771);
+}
+
+// The table of Bundle::temperature_at, a row each: up from 20 to 40 C in 100 s, 100 s there, down again. The log
+// reads 1 C more; what it should say of the moments that it lacks is worked out by hand.
+TEST(Temperature, AGapOfTheLogFollowsTheCommand) {
+  Bundle bundle;
+  const std::array<std::array<double, 2>, 3> commanded_c = {{{20, 40}, {40, 40}, {40, 20}}};
+  for (std::size_t i = 0; i < commanded_c.size(); ++i) {
+    Segment segment;
+    segment.samples = 10000;
+    segment.first_sample = 10000 * i;
+    segment.host_start_s = 100.0 * static_cast<double>(i);
+    segment.temperature_start_c = commanded_c[i][0];
+    segment.temperature_end_c = commanded_c[i][1];
+    bundle.segments.push_back(segment);
+  }
+  EXPECT_NEAR(bundle.temperature_at(50), 30, 1e-9) << "no log: as commanded";
+  bundle.temperature = {{0, 60, 130, 250}, {21, 33, 41, 31}};
+  EXPECT_NEAR(bundle.temperature_at(30), 27, 1e-9) << "a minute: on the line";
+  EXPECT_NEAR(bundle.temperature_at(100), 41, 1e-9) << "the line has 37.6";
+  EXPECT_NEAR(bundle.temperature_at(200), 41, 1e-9) << "the line has 35.2";
+  EXPECT_NEAR(bundle.temperature_at(300), 21, 1e-9) << "behind the last reading";
+  bundle.segments[2].temperature_start_c = 30;
+  EXPECT_NEAR(bundle.temperature_at(200), 41 - 10 * 70.0 / 120, 1e-9) << "it jumps: on the line";
+  EXPECT_NEAR(bundle.temperature_at(100), 41, 1e-9) << "it does not jump here";
+  bundle.temperature = {{60, 130}, {33, 41}};
+  EXPECT_NEAR(bundle.temperature_at(0), 21, 1e-9) << "before the first reading";
+  EXPECT_NEAR(bundle.temperature_at(250), 41, 1e-9) << "behind a jump: the last reading";
 }
 
 }  // namespace
