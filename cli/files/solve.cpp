@@ -109,6 +109,9 @@ Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& op
     outcome.is_lent = false;
     outcome.report.notes.push_back(std::move(why));
   }
+  if (std::string why = repair::why_legacy_repairs_none(survey.facts); !why.empty()) {
+    outcome.report.notes.push_back(std::move(why));
+  }
   if (const Status kept = keep(path, options, survey, outcome, context, outputs); !kept) {
     outcome.not_kept = kept.error();
   }

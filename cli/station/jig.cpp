@@ -468,7 +468,11 @@ std::string what_it_holds(const station::JigReport& report, bool is_replay) {
     return report.written
                ? fmt::format("{} - WRITTEN: the unit holds the new constants, as read back",
                              verdict)
-               : fmt::format("{} - NOT WRITTEN: the unit holds its old constants", verdict);
+               : fmt::format(
+                     "{} - NOT WRITTEN: the unit holds its old constants; to change that, measure "
+                     "it "
+                     "again with --write",
+                     verdict);
   }
   const bool is_unjudged = report.verdict == station::JigVerdict::inconclusive ||
                            report.verdict == station::JigVerdict::stopped;

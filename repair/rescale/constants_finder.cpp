@@ -126,18 +126,14 @@ ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const st
     return result;
   }
   result.serial = surveyed->facts.serial;
-  const auto filter = filter_in_force(surveyed->facts);
-  if (filter != FilterConfiguration::current) {
-    result.refusal =
-        filter.has_value()
-            ? fmt::format(
-                  "it was recorded under the legacy configuration (firmware {} chose it): "
-                  "record one with firmware 1.4.0 to 1.7.0, or put the unit on the jig",
-                  printable(surveyed->facts.firmware, 40))
-            : "it cannot be told under which filter configuration it was recorded";
+  if (!filter_in_force(surveyed->facts)) {
+    result.refusal = "it cannot be told under which filter configuration it was recorded";
     return result;
   }
-  result.refusal = why_not_lent(*surveyed);
+  result.refusal = why_legacy_repairs_none(surveyed->facts);
+  if (result.refusal.empty()) {
+    result.refusal = why_not_lent(*surveyed);
+  }
   if (!result.refusal.empty()) {
     return result;
   }

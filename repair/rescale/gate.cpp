@@ -128,6 +128,17 @@ GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh
           {}};
 }
 
+std::string why_legacy_repairs_none(const FileFacts& facts) {
+  if (filter_in_force(facts) != calib::FilterConfiguration::legacy) {
+    return {};
+  }
+  return fmt::format(
+      "it was recorded under the legacy configuration (firmware {} chose it): its constants repair "
+      "no affected "
+      "file; record one with firmware 1.4.0 to 1.7.0, or put the unit on the jig",
+      printable(facts.firmware, 40));
+}
+
 std::string why_not_lent(const Survey& survey) {
   FileFacts one = survey.facts;
   one.other_firmware.clear();

@@ -114,4 +114,8 @@ bool refutes(GateRow row);
 // A sentence; empty where its constants may be lent. The survey is of the whole recording.
 std::string why_not_lent(const Survey& survey);
 
+// A sentence for a recording made under `legacy`: its constants repair no affected file, since those were
+// recorded under `current`. Empty for all others.
+std::string why_legacy_repairs_none(const FileFacts& facts);
+
 }  // namespace sixpoint::repair

@@ -133,6 +133,21 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
 }
 
+// Good constants of the wrong filter: who keeps them must know that they repair nothing.
+TEST_F(SolveCommand, ConstantsOfTheLegacyFilterSaySo) {
+  MadeRecording made = sides_recording({0, 1, 2, 3, 4, 5});
+  const auto notes = [&](const std::string& firmware) {
+    made.firmware = firmware;
+    const auto answer = run({"solve", write(made, firmware + ".gt3x"), "--json"});
+    EXPECT_EQ(answer.exit_code, 0) << answer.people;
+    return answer.json()["notes"].dump();
+  };
+  EXPECT_THAT(notes("1.3.0"),
+              testing::HasSubstr("(firmware 1.3.0 chose it): its constants repair "
+                                 "no affected file; record one with firmware 1.4.0"));
+  EXPECT_THAT(notes("1.5.0"), testing::Not(testing::HasSubstr("legacy")));
+}
+
 // Affected by its header, and right by the constants stored in it: other software leaves such a
 // file, and what is solved from it is not the sensor. Oracle: the sensor that the other file was
 // made with.
