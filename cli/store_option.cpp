@@ -15,6 +15,7 @@
 #include "cli/people_text.h"
 #include "db/records.h"
 #include "gt3x/forms/model.h"
+#include "repair/rescale/applying_constants.h"
 #include "station/records/run_records.h"
 
 namespace sixpoint::cli {
@@ -185,6 +186,13 @@ Result<SavedConstants> save_constants(Context& context, const std::string& locat
         SIXPOINT_ASSIGN(done.id, writer.add_constants(station::constants_row(record), model));
         return {};
       }));
+  if (done.place.in_store()) {
+    SIXPOINT_ASSIGN(const auto history, store->constants_history(record.serial));
+    const auto applying = repair::applying_constants(history, record.filter);
+    if (!applying.doubt.empty() || applying.conflict) {
+      context.log().warn("{}", applying.conflict ? applying.why : applying.doubt);
+    }
+  }
   return done;
 }
 

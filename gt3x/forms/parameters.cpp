@@ -1,5 +1,6 @@
 #include "gt3x/forms/parameters.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -25,14 +26,23 @@ void append_le(Bytes& out, std::uint32_t value, std::size_t size) {
   }
 }
 
-std::optional<PerAxis<int>> constants_at(const ParameterValues& values, std::uint16_t first) {
+// The value, where there is one and no other.
+std::optional<std::uint32_t> value_of(const Parameters& parameters, const ParameterKey& key) {
+  const auto found = parameters.values.find(key);
+  return found == parameters.values.end() || parameters.doubled.contains(key)
+             ? std::nullopt
+             : std::optional(found->second);
+}
+
+std::optional<PerAxis<int>> constants_at(const Parameters& parameters, std::uint16_t first) {
   PerAxis<int> axes{};
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const auto found = values.find({kParameterUnitSpace, static_cast<std::uint16_t>(first + axis)});
-    if (found == values.end()) {
+    const auto found =
+        value_of(parameters, {kParameterUnitSpace, static_cast<std::uint16_t>(first + axis)});
+    if (!found) {
       return std::nullopt;
     }
-    const auto value = static_cast<std::int32_t>(found->second);
+    const auto value = static_cast<std::int32_t>(*found);
     if (value < kStoredConstantMin || value > kStoredConstantMax) {
       return std::nullopt;
     }
@@ -55,6 +65,15 @@ bool Parameters::has_zero_range() const {
   return false;
 }
 
+bool Parameters::agrees_with(const StoredConstants& of_another) const {
+  ParameterValues expected;
+  set_constants(expected, of_another);
+  return std::ranges::all_of(expected, [&](const auto& entry) {
+    const auto own = values.find(entry.first);
+    return own == values.end() || (own->second == entry.second && !doubled.contains(entry.first));
+  });
+}
+
 Result<Parameters> parse_parameters(std::span<const std::uint8_t> payload) {
   if (payload.size() % kEntrySize != 0) {
     return fail(ErrorCode::bad_data,
@@ -66,28 +85,29 @@ Result<Parameters> parse_parameters(std::span<const std::uint8_t> payload) {
   for (std::size_t at = 0; at < payload.size(); at += kEntrySize) {
     const ParameterKey key(static_cast<std::uint16_t>(read_le(payload, at, 2)),
                            static_cast<std::uint16_t>(read_le(payload, at + 2, 2)));
-    parameters.values[key] = read_le(payload, at + 4, 4);
+    const std::uint32_t value = read_le(payload, at + 4, 4);
+    const auto [entry, is_new] = parameters.values.try_emplace(key, value);
+    if (!is_new && entry->second != value) {
+      parameters.doubled.insert(key);
+      entry->second = value;
+    }
   }
-  const auto value = [&](const ParameterKey& key) -> std::optional<std::uint32_t> {
-    const auto found = parameters.values.find(key);
-    return found == parameters.values.end() ? std::nullopt : std::optional(found->second);
-  };
-  if (const auto time = value(kParameterCalibrationTime); time && *time != 0) {
+  if (const auto time = value_of(parameters, kParameterCalibrationTime); time && *time != 0) {
     parameters.calibration_time = from_unix_seconds(*time);
   }
-  if (const auto scale = value(kParameterAccelScale)) {
+  if (const auto scale = value_of(parameters, kParameterAccelScale)) {
     const double decoded = decode_float(*scale);
     // A scale outside this range belongs to no accelerometer; it would turn samples to nonsense.
     if (decoded >= 1 && decoded <= 32768) {
       parameters.accel_scale_lsb_per_g = decoded;
     }
   }
-  if (const auto firmware = value(kParameterFirmwareVersion)) {
+  if (const auto firmware = value_of(parameters, kParameterFirmwareVersion)) {
     parameters.firmware = decode_firmware(*firmware);
   }
-  const auto positive = constants_at(parameters.values, kParameterPositive);
-  const auto negative = constants_at(parameters.values, kParameterNegative);
-  const auto zero = constants_at(parameters.values, kParameterZero);
+  const auto positive = constants_at(parameters, kParameterPositive);
+  const auto negative = constants_at(parameters, kParameterNegative);
+  const auto zero = constants_at(parameters, kParameterZero);
   if (positive && negative && zero) {
     parameters.constants = StoredConstants{*positive, *negative, *zero};
   }

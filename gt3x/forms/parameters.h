@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -44,8 +45,12 @@ struct Parameters {
   std::optional<UtcTime> calibration_time;  // absent also where the unit wrote 0
   std::optional<double> accel_scale_lsb_per_g;
   std::optional<std::string> firmware;  // "1.5.0" from 0x01050000
-  ParameterValues values;               // everything, known or not
+  ParameterValues values;               // everything, known or not; of entries below the last value
+  // Entries that stand twice, with two values. Which one holds is not known: neither is used above.
+  std::set<ParameterKey> doubled;
 
+  // Whether each of the nine numbers that it names is that of these constants; true where it names none.
+  bool agrees_with(const StoredConstants& of_another) const;
   // An axis whose positive equals its negative reading, a division by zero in Eq. 1-3.
   bool has_zero_range() const;
 };

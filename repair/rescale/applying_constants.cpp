@@ -87,6 +87,27 @@ std::optional<std::string> conflict_with(const Candidate& best, const std::vecto
   return std::nullopt;
 }
 
+// The first other set of the same method that disagrees.
+std::string doubt_about(const Candidate& best, const std::vector<Candidate>& same_method) {
+  constexpr std::size_t kDate = 10;
+  for (const Candidate& other : same_method) {
+    if (!other.record || !best.record) {
+      continue;
+    }
+    const auto between = calib::agreement(best.record->calibration, best.record->uncertainty,
+                                          other.record->calibration, other.record->uncertainty);
+    if (!between.agree()) {
+      return fmt::format(
+          "the store's set {} of {} disagrees with this one, {} ({}): one of them may be of "
+          "another unit, or the "
+          "sensor has changed; 'sixpoint store prefer ID --why TEXT' or 'store withdraw' decides",
+          db::shown_id(other.row->id), to_iso8601(other.row->made_at).substr(0, kDate),
+          db::shown_id(best.row->id), between.brief());
+    }
+  }
+  return {};
+}
+
 // "5c0f91aa on 2026-11-22 (wrong jig)", the latest ones first; empty where there are none.
 std::string withdrawn_sets(const db::UnitHistory& history, const std::string& filter) {
   constexpr std::size_t kMostSets = 3;
@@ -163,8 +184,10 @@ Applying applying_constants(const db::UnitHistory& history, calib::FilterConfigu
     }
     answer.index = best.index;
     answer.why = why_of(best, all, same_method);
+    answer.doubt = doubt_about(best, same_method);
   }
-  answer.about[*answer.index] = answer.why;
+  answer.about[*answer.index] =
+      answer.doubt.empty() ? answer.why : answer.why + "; " + answer.doubt;
   return answer;
 }
 

@@ -20,6 +20,7 @@
 // |                                                        | uncertainty comes last)            |
 // | of one method, equally certain                         | the latest `made_at`, of equals    |
 // |                                                        | the last one stored                |
+// | ... but another one of that method disagrees           | the same; `doubt` says it          |
 //
 // Two sets disagree as calib/application/agreement.h has it. Sets of an earlier version, which do
 // not say where they were made, count as file scans unless their method is the jig's.
@@ -43,6 +44,8 @@ struct Applying {
   std::optional<std::size_t> index;  // into UnitHistory::constants
   std::string why;                   // it applies, or why nothing does
   bool conflict = false;             // a person must decide ('sixpoint store prefer')
+  // Another set of the same method disagrees with the one that applies, which no person preferred.
+  std::string doubt;
   // Where nothing applies: the sets of this configuration that were withdrawn, when and why.
   std::string withdrawn;
   // Of every set of the history: why it applies or does not.

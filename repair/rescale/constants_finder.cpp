@@ -53,6 +53,7 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
                   calib::solve_from_still_blocks(survey.blocks, file_constants, options));
   report.serial = survey.facts.serial;
   report.filter = filter_in_force(survey.facts);
+  report.notes.insert(report.notes.end(), survey.notes.begin(), survey.notes.end());
   report.temperature =
       calib::temperature_drift(survey.resting, report.calibration.value_or(file_constants));
   if (report.temperature) {
@@ -115,6 +116,9 @@ Status ConstantsFinder::ask_store(const Survey& survey, ConstantsChoice& choice)
   }
   SIXPOINT_ASSIGN(auto record, calib::parse_constants_record(found->document));
   choice.chosen = ChosenConstants{std::move(record), "store", found->id};
+  if (!found->doubt.empty()) {
+    choice.reasons.push_back(found->doubt);
+  }
   return {};
 }
 

@@ -27,7 +27,7 @@ Result<std::optional<ConstantsSnapshot::Entry>> ConstantsSnapshot::of_unit(
     return std::optional<Entry>();
   }
   const db::ConstantsRecord& set = history.constants[*applying.index];
-  return std::optional(Entry{set.id, set.document, ""});
+  return std::optional(Entry{set.id, set.document, "", "", applying.doubt});
 }
 
 Result<ConstantsSnapshot> ConstantsSnapshot::of_store(db::Store& store) {
@@ -49,7 +49,8 @@ std::string ConstantsSnapshot::to_json_lines() const {
                  {"id", entry.id},
                  {"document", entry.document},
                  {"conflict", entry.conflict},
-                 {"withdrawn", entry.withdrawn}}
+                 {"withdrawn", entry.withdrawn},
+                 {"doubt", entry.doubt}}
                 .dump(-1, ' ', false, Json::error_handler_t::replace);
     text += '\n';
   }
@@ -70,7 +71,8 @@ Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
     snapshot.entries_[json["serial"].get<std::string>()] = {
         json["id"].get<std::string>(), json["document"].get<std::string>(),
         json["conflict"].get<std::string>(),
-        is_text("withdrawn") ? json["withdrawn"].get<std::string>() : ""};
+        is_text("withdrawn") ? json["withdrawn"].get<std::string>() : "",
+        is_text("doubt") ? json["doubt"].get<std::string>() : ""};
   }
   return snapshot;
 }

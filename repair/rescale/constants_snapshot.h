@@ -23,6 +23,7 @@ class ConstantsSnapshot {
     std::string conflict;  // instead of both: why a person must decide (applying_constants.h)
     // Instead of all three: none apply, because these were withdrawn (applying_constants.h).
     std::string withdrawn = {};
+    std::string doubt = {};  // beside the first two: applying_constants.h
   };
 
   // The constants under `current` that apply or were withdrawn, of every unit of the store.

@@ -144,11 +144,14 @@ std::string why_not_lent(const Survey& survey) {
   one.other_firmware.clear();
   FileFacts other = one;
   other.firmware = survey.facts.other_firmware;
-  if (!other.firmware.empty() && triage(one).axes_rotated != triage(other).axes_rotated) {
+  const bool turns = triage(one).axes_rotated != triage(other).axes_rotated;
+  if (!other.firmware.empty() && (turns || filter_in_force(one) != filter_in_force(other))) {
     return fmt::format(
-        "the recording names the firmware versions {} and {}, which lay the axes differently: its "
-        "constants are not used for other recordings",
-        printable(one.firmware, 40), printable(other.firmware, 40));
+        "the recording names the firmware versions {} and {}, which {} differently: its constants "
+        "are not "
+        "used for other recordings",
+        printable(one.firmware, 40), printable(other.firmware, 40),
+        turns ? "lay the axes" : "set the filter");
   }
   if (triage(survey.facts).verdict != Verdict::affected || survey.constants.empty()) {
     return {};
@@ -168,7 +171,10 @@ std::string why_not_lent(const Survey& survey) {
       kMostOfCorrected_mg);
 }
 
-bool refutes(GateRow row) { return row == GateRow::worse || row == GateRow::too_much_left; }
+bool refutes(GateRow row, const GateEvidence& evidence) {
+  return row == GateRow::worse || row == GateRow::too_much_left ||
+         (row == GateRow::rounded_away && evidence.before_mg > kMostOfCorrected_mg);
+}
 
 GateAnswer gate(const GateEvidence& evidence, bool force) {
   GateAnswer answer;

@@ -38,6 +38,7 @@
 // |----------------------------------------------------------------------------|---------|
 // | worse, too_much_left                                                       | yes     |
 // | any, but its own still periods contradict the constants (agreement.h)      | yes     |
+// | rounded_away, and more than 16 mg before: rounding hides no such gain      | yes     |
 // | no_better, rounded_away, ambiguous: it may have been corrected before      | no      |
 // | any other                                                                  | no      |
 //
@@ -46,7 +47,7 @@
 //
 // | the recording                                                                       | lends |
 // |-------------------------------------------------------------------------------------|-------|
-// | names two firmware versions that lay the axes differently                           | no    |
+// | names two firmware versions that lay the axes, or set the filter, differently       | no    |
 // | affected by its header, yet within 16 mg of 1 g by the constants stored in it, in 4 | no    |
 // | or more directions, and the counts may come from other software                     |       |
 // | any other                                                                           | yes   |
@@ -109,7 +110,7 @@ struct GateAnswer {
   std::string reason;   // for people; with both numbers where they decide; empty where it helps
 };
 GateAnswer gate(const GateEvidence& evidence, bool force);
-bool refutes(GateRow row);
+bool refutes(GateRow row, const GateEvidence& evidence);
 
 // A sentence; empty where its constants may be lent. The survey is of the whole recording.
 std::string why_not_lent(const Survey& survey);

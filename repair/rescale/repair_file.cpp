@@ -307,7 +307,7 @@ class Repair {
     evidence_->refuted_by = options_.refuted_by;
     const GateAnswer answer = gate(*evidence_, options_.force);
     report_.waits_for_others = options_.leave_unchecked && answer.row == GateRow::not_checked;
-    report_.refutes_constants = refutes(answer.row);
+    report_.refutes_constants = refutes(answer.row, *evidence_);
     if (evidence_->directions > 0) {
       report_.still_error_after_mg = evidence_->after_mg;
     }
@@ -349,6 +349,7 @@ class Repair {
       return true;
     }
     report_.reasons.push_back(answer.reason);
+    report_.refutes_constants = refutes(answer.row, *evidence_);
     report_.forced = answer.forced;
     if (answer.forced) {
       report_.reasons.emplace_back("--force: repaired all the same");

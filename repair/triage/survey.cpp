@@ -98,13 +98,20 @@ bool has_samples(const gt3x::Record& record) {
           record.is(gt3x::RecordType::activity3));
 }
 
-// The PARAMETERS record that holds for the first samples: the last before them, or else the first
-// behind them. Its checksum holds. Nothing when there is none.
-Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
+// What holds for the first samples; of records whose checksum holds.
+struct FirstParameters {
+  // The last PARAMETERS before them, or else the first behind them.
+  std::optional<gt3x::Parameters> record;
+  // The same of the records that have all nine numbers.
+  std::optional<StoredConstants> constants;
+};
+
+// `with_constants`: reads on until a record has them.
+Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_constants) {
   SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
-  std::optional<gt3x::Parameters> found;
+  FirstParameters found;
   bool sampled = false;
-  while (!(found && sampled)) {
+  while (!(sampled && found.record && (found.constants || !with_constants))) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {
       break;
@@ -114,10 +121,15 @@ Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& record
     }
     if (item->record.is(gt3x::RecordType::parameters)) {
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
-        if (found && !parameters->firmware) {  // a later record need not repeat it
-          parameters->firmware = found->firmware;
+        if (parameters->constants && !(sampled && found.constants)) {
+          found.constants = parameters->constants;
         }
-        found = *std::move(parameters);
+        if (found.record && !parameters->firmware) {  // a later record need not repeat it
+          parameters->firmware = found.record->firmware;
+        }
+        if (!(sampled && found.record)) {
+          found.record = *std::move(parameters);
+        }
       }
     }
     sampled = sampled || has_samples(item->record);
@@ -246,9 +258,9 @@ Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
       add_facts(*memory, facts);
     }
   } else {
-    SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
-    if (first) {
-      add_facts(*first, facts);
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording, false));
+    if (first.record) {
+      add_facts(*first.record, facts);
     }
   }
   return facts;
@@ -287,16 +299,16 @@ class LogSurvey::Pass {
 
   // Finds out the scale, and the constants of the samples before the first PARAMETERS record.
   Status begin() {
-    SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
-    take_scale(first);
-    if (first.has_value()) {
-      add_facts(*first, result_.facts);
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording_, true));
+    take_scale(first.record);
+    if (first.record) {
+      add_facts(*first.record, result_.facts);
     }
     scale_lsb_per_g_ = result_.header_scale_lsb_per_g;
     rotated_ = triage(result_.facts).axes_rotated && !result_.already_repaired;
     SIXPOINT_ASSIGN(still_, make_scan(result_.header_scale_lsb_per_g, options_));
-    if (first.has_value()) {
-      use_constants(*first);
+    if (first.constants) {
+      use_constants(*first.constants);
     }
     return {};
   }
@@ -347,7 +359,11 @@ class LogSurvey::Pass {
     if (written && !recording_.info().accel_scale_lsb_per_g()) {
       replaced("info.txt", fmt::format("'{}'", printable(*written, 20)));
     }
-    if (first && !first->accel_scale_lsb_per_g) {
+    if (first && first->doubled.contains(gt3x::kParameterAccelScale)) {
+      result_.notes.push_back(
+          fmt::format("PARAMETERS give two acceleration scales: {} LSB/g was used",
+                      result_.accel_scale_lsb_per_g));
+    } else if (first && !first->accel_scale_lsb_per_g) {
       const auto code = first->values.find(gt3x::kParameterAccelScale);
       if (code != first->values.end()) {
         replaced("PARAMETERS", fmt::format("{:g}", gt3x::decode_float(code->second)));
@@ -359,18 +375,41 @@ class LogSurvey::Pass {
     return StillScan::make(result_.rate_hz, scale_lsb_per_g, options);
   }
 
-  void use_constants(const gt3x::Parameters& parameters) {
+  void use_constants(const StoredConstants& constants) {
     // A repaired file's counts come from other constants than its PARAMETERS say.
-    if (!parameters.constants.has_value() || result_.already_repaired) {
+    if (result_.already_repaired) {
       return;
     }
-    if (auto status = still_->set_constants(*parameters.constants); !status) {
+    in_force_ = constants;
+    if (auto status = still_->set_constants(constants); !status) {
       result_.constants_problem = status.error();
       result_.constants_problem->where = recording_.path();
     }
-    if (std::ranges::find(result_.constants, *parameters.constants) == result_.constants.end() &&
+    if (std::ranges::find(result_.constants, constants) == result_.constants.end() &&
         result_.constants.size() <= kMaxSetsOfConstants) {
-      result_.constants.push_back(*parameters.constants);
+      result_.constants.push_back(constants);
+    }
+  }
+
+  // The table of Survey::constants.
+  void use_constants_of(const gt3x::Parameters& parameters) {
+    if (parameters.constants) {
+      use_constants(*parameters.constants);
+      is_complete_ = true;
+    }
+    contradicted_ = !parameters.constants && in_force_ && !parameters.agrees_with(*in_force_);
+  }
+
+  void check_constants_of_samples() {
+    if (contradicted_ && !result_.constants_problem) {
+      result_.constants_problem = no_constants(
+          "a PARAMETERS record has some of the nine constants only, and other ones than the "
+          "complete "
+          "record: which constants its samples were made by is not known",
+          recording_.path(), "download the recording from the unit again");
+    }
+    if (in_force_ && !is_complete_) {
+      samples_before_constants_ += samples_.size();
     }
   }
 
@@ -391,22 +430,38 @@ class LogSurvey::Pass {
     scale_lsb_per_g_ = scale_lsb_per_g;
   }
 
-  // A date behind the first samples that leads to another answer.
-  void use_date(const gt3x::Parameters& parameters) {
+  // A date, or a firmware, behind the first samples that leads to another answer.
+  void use_later_facts(const gt3x::Parameters& parameters) {
+    if (result_.samples == 0) {
+      return;
+    }
     FileFacts other = result_.facts;
     other.calibration_time = parameters.calibration_time;
-    if (result_.samples > 0 && date_of_constants(other) && result_.facts.calibration_time &&
+    if (date_of_constants(other) && result_.facts.calibration_time &&
         triage(other).verdict != triage(result_.facts).verdict) {
       result_.facts.other_calibration_time = parameters.calibration_time;
     }
+    other = result_.facts;
+    other.firmware = parameters.firmware.value_or("");
+    if (!other.firmware.empty() && result_.facts.other_firmware.empty() &&
+        !leads_to_same_answers(other, result_.facts)) {
+      result_.facts.other_firmware = other.firmware;
+    }
+  }
+
+  static bool leads_to_same_answers(const FileFacts& one, const FileFacts& other) {
+    const Triage of_one = triage(one);
+    const Triage of_other = triage(other);
+    return of_one.verdict == of_other.verdict && of_one.axes_rotated == of_other.axes_rotated &&
+           filter_in_force(one) == filter_in_force(other);
   }
 
   Status take_good(const gt3x::Record& record) {
     if (record.is(gt3x::RecordType::parameters)) {
       if (const auto parameters = gt3x::parse_parameters(record.payload)) {
         use_scale(*parameters);
-        use_constants(*parameters);
-        use_date(*parameters);
+        use_constants_of(*parameters);
+        use_later_facts(*parameters);
       }
     } else if (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2)) {
       if (has_samples(record)) {
@@ -441,6 +496,7 @@ class LogSurvey::Pass {
     }
     ++result_.sample_records;
     result_.samples += samples_.size();
+    check_constants_of_samples();
     if (const auto all = gt3x::range_of(samples_);
         all.low <= gt3x::kMin12 || all.high >= gt3x::kMax12) {
       result_.beyond_12_bits =
@@ -487,6 +543,12 @@ class LogSurvey::Pass {
   void end() {
     StillScan& scan = raw_still_ ? *raw_still_ : *still_;
     take_scan(scan, recording_.path(), result_);
+    if (samples_before_constants_ > 0) {
+      result_.notes.push_back(fmt::format(
+          "the first {} samples stand before all complete PARAMETERS: they are taken to have been "
+          "made by the constants of the first ones behind them",
+          samples_before_constants_));
+    }
     if (raw_resting_) {
       result_.resting = raw_resting_->finish();
     }
@@ -511,6 +573,10 @@ class LogSurvey::Pass {
   Survey result_;
   bool rotated_ = false;
   double scale_lsb_per_g_ = 0;  // in force
+  std::optional<StoredConstants> in_force_;
+  bool is_complete_ = false;   // a record with all nine stood before
+  bool contradicted_ = false;  // the last record has some of them, and not those in force
+  std::uint64_t samples_before_constants_ = 0;
   std::optional<StillScan> still_;
   std::optional<StillScan> raw_still_;  // of raw counts (.agdc)
   std::optional<StillScan> raw_resting_;

@@ -63,7 +63,17 @@ struct Survey {
   bool already_repaired = false;  // a mark is there: the zip entry or the record in the log
   // What had to be assumed, a sentence each: a scale that cannot be and was replaced.
   std::vector<std::string> notes;
-  // The constants that were in force for at least one sample, in order; usually one set.
+  // The constants that were in force for at least one sample, in order; usually one set. For a sample hold:
+  //
+  // | the last PARAMETERS before it                       | constants                                   |
+  // |-----------------------------------------------------|---------------------------------------------|
+  // | all nine numbers                                    | these                                       |
+  // | some of the nine, or none, and none contradicts     | the last complete ones before, else the     |
+  // | those that are in force                             | first complete ones behind (said in notes)  |
+  // | some of the nine, and one contradicts               | not known: constants_problem                |
+  // | there are none                                      | the first complete ones behind (said)       |
+  //
+  // repair/rescale/rescaled_log.h undoes the same ones (promise R22).
   std::vector<StoredConstants> constants;
   // An .agdc file's samples are raw counts, which nothing has to be undone for and nothing can be
   // repaired in; this is what its calibration.json makes of them (the six-point form, else offset

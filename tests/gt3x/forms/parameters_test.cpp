@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -53,6 +54,58 @@ TEST(Parameters, RoundTrip) {
   EXPECT_EQ(parsed->values, values);
   EXPECT_FALSE(parsed->has_zero_range());
   EXPECT_EQ(encode_parameters(parsed->values), payload);
+}
+
+// Entries that stand twice: with one value they count, with two neither does, whichever comes last.
+TEST(Parameters, AnEntryWithTwoValuesIsNotUsed) {
+  ParameterValues values;
+  set_constants(values, {{326, 287, 303}, {-201, -268, -192}, {61, 4, 61}});
+  values[kParameterCalibrationTime] = 1'384'266'733;
+  values[kParameterFirmwareVersion] = 0x01050000;
+  values[kParameterAccelScale] = encode_float(256);
+  const Bytes once = encode_parameters(values);
+  Bytes twice = once;
+  twice.insert(twice.end(), once.begin(), once.end());
+  const auto same = parse_parameters(twice);
+  ASSERT_OK(same);
+  EXPECT_TRUE(same->doubled.empty());
+  EXPECT_TRUE(same->constants && same->calibration_time && same->firmware);
+  const auto without = [&](const ParameterKey& key, bool first) {
+    const Bytes other = encode_parameters({{key, 7}});
+    Bytes both = first ? other : once;
+    const Bytes& rest = first ? once : other;
+    both.insert(both.end(), rest.begin(), rest.end());
+    auto parsed = parse_parameters(both);
+    EXPECT_OK(parsed);
+    EXPECT_EQ(parsed->doubled, std::set{key});
+    return *std::move(parsed);
+  };
+  for (const bool first : {false, true}) {
+    EXPECT_FALSE(without(kParameterCalibrationTime, first).calibration_time);
+    EXPECT_FALSE(without(kParameterFirmwareVersion, first).firmware);
+    EXPECT_FALSE(without(kParameterAccelScale, first).accel_scale_lsb_per_g);
+    EXPECT_FALSE(without({kParameterUnitSpace, kParameterZero}, first).constants);
+  }
+}
+
+TEST(Parameters, SomeOfTheNineAgreeOrNot) {
+  const StoredConstants constants{{326, 287, 303}, {-201, -268, -192}, {61, 4, 61}};
+  const auto agree = [&](const ParameterValues& values) {
+    const auto parsed = parse_parameters(encode_parameters(values));
+    return parsed && parsed->agrees_with(constants);
+  };
+  EXPECT_TRUE(agree({})) << "none of them";
+  ParameterValues values;
+  set_constants(values, constants);
+  EXPECT_TRUE(agree(values));
+  values.erase({kParameterUnitSpace, kParameterZero});
+  EXPECT_TRUE(agree(values));
+  values[{kParameterUnitSpace, kParameterNegative}] = static_cast<std::uint32_t>(-202);
+  EXPECT_FALSE(agree(values));
+  Bytes payload = encode_parameters({{{kParameterUnitSpace, kParameterZero}, 61}});
+  const Bytes other = encode_parameters({{{kParameterUnitSpace, kParameterZero}, 62}});
+  payload.insert(payload.begin(), other.begin(), other.end());
+  EXPECT_FALSE(parse_parameters(payload)->agrees_with(constants)) << "twice";
 }
 
 TEST(Parameters, MissingOrImpossibleConstantsAreAbsent) {

@@ -43,7 +43,7 @@ class Sets {
     const Applying answer = applying_constants(history, FilterConfiguration::current);
     EXPECT_EQ(answer.about.size(), history.constants.size());
     if (answer.index) {
-      EXPECT_EQ(answer.about[*answer.index], answer.why);
+      EXPECT_THAT(answer.about[*answer.index], testing::StartsWith(answer.why));
       EXPECT_THAT(answer.why, testing::StartsWith("applies"));
       return history.constants[*answer.index].id;
     }
@@ -124,6 +124,27 @@ TEST(ApplyingConstants, WithinTheUncertaintiesOrOlderItIsNoConflict) {
   const auto newer_jig = older.add("jig", 3, 1);
   older.add("file_scan", 2, 1, 40);
   EXPECT_EQ(older.applying(), newer_jig);
+}
+
+TEST(ApplyingConstants, ASetOfTheSameMethodThatDisagreesIsSaid) {
+  Sets sets;
+  const auto first = sets.add("file_scan", 1, 2);
+  const auto doubt = [&] {
+    return applying_constants(sets.history, FilterConfiguration::current).doubt;
+  };
+  EXPECT_EQ(doubt(), "");
+  sets.add("file_scan", 2, 2, 15);
+  EXPECT_EQ(doubt(), "") << "3 sqrt(2^2 + 2^2) + 10 = 18 mg are allowed";
+  const auto other = sets.add("file_scan", 3, 2, 115);
+  EXPECT_EQ(sets.history.constants.back().id, other);
+  const Applying answer = applying_constants(sets.history, FilterConfiguration::current);
+  EXPECT_EQ(sets.history.constants[answer.index.value()].id, other) << "the latest all the same";
+  EXPECT_THAT(answer.doubt,
+              HasSubstr("the store's set set 0 of 1970-01-02 disagrees with this one"));
+  EXPECT_THAT(answer.about[2],
+              testing::AllOf(HasSubstr("applies: the latest"), HasSubstr("115.0 mg")));
+  sets.correct(first, "prefer");
+  EXPECT_EQ(doubt(), "") << "a person has decided";
 }
 
 TEST(ApplyingConstants, OfOneMethodTheSmallestUncertaintyThenTheLatest) {

@@ -56,14 +56,19 @@ TEST(Gate, WhatAnotherFileOfTheUnitRefutesIsNotWritten) {
 }
 
 TEST(Gate, OnlyWhatSpeaksAgainstTheConstantsRefutesThem) {
+  const GateEvidence affected = {9, 96, 1};
+  const GateEvidence nearly_right = {9, 2, 1};
   for (const GateRow row : {GateRow::worse, GateRow::too_much_left}) {
-    EXPECT_TRUE(refutes(row));
+    EXPECT_TRUE(refutes(row, affected));
+    EXPECT_TRUE(refutes(row, nearly_right));
   }
-  for (const GateRow row :
-       {GateRow::refuted, GateRow::not_checked, GateRow::no_better, GateRow::rounded_away,
-        GateRow::ambiguous, GateRow::weak, GateRow::helps}) {
-    EXPECT_FALSE(refutes(row));
+  for (const GateRow row : {GateRow::refuted, GateRow::not_checked, GateRow::no_better,
+                            GateRow::ambiguous, GateRow::weak, GateRow::helps}) {
+    EXPECT_FALSE(refutes(row, affected));
+    EXPECT_FALSE(refutes(row, nearly_right));
   }
+  EXPECT_TRUE(refutes(GateRow::rounded_away, affected));
+  EXPECT_FALSE(refutes(GateRow::rounded_away, nearly_right));
 }
 
 TEST(Gate, WhatGetsWorseIsNotWritten) {
@@ -150,7 +155,10 @@ TEST(WhyNotLent, FollowsTheTable) {
   };
   EXPECT_EQ(why_of(tests::six_sides()), "") << "affected, and 100 mg off";
   EXPECT_EQ(why_of(tests::six_sides(), "1.7.0"), "") << "the axes lie alike under both";
-  EXPECT_THAT(why_of(tests::six_sides(), "1.6.0"), HasSubstr("1.5.0 and 1.6.0"));
+  EXPECT_THAT(why_of(tests::six_sides(), "1.6.0"),
+              HasSubstr("1.5.0 and 1.6.0, which lay the axes"));
+  EXPECT_THAT(why_of(tests::six_sides(), "1.8.0"),
+              HasSubstr("1.5.0 and 1.8.0, which set the filter"));
   // Counts that are right by the stored constants, as other software leaves them.
   const auto corrected = [](std::size_t sides) {
     tests::MadeRecording made;

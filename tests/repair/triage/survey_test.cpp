@@ -176,6 +176,85 @@ TEST(Survey, OfTwoDatesOfCalibrationTheOneInForceHoldsOrNone) {
   EXPECT_NE(reason.find("two dates of calibration"), std::string::npos) << reason;
 }
 
+// A firmware that a later PARAMETERS record names counts where it leads to another answer, to turned axes or to another
+// filter.
+TEST(Survey, ALaterFirmwareThatLeadsToAnotherAnswerStandsBesideTheFirst) {
+  const auto found_with = [](const std::string& first, const std::string& behind) {
+    tests::MadeRecording made = tests::six_sides();
+    made.firmware = first;
+    made.between = [&](std::size_t second) {
+      Bytes bytes;
+      if (second == 20) {
+        gt3x::ParameterValues values = gt3x::parse_parameters(made.parameters())->values;
+        values[gt3x::kParameterFirmwareVersion] = *gt3x::encode_firmware(behind);
+        gt3x::append_record(bytes, gt3x::RecordType::parameters, 7,
+                            gt3x::encode_parameters(values));
+      }
+      return bytes;
+    };
+    MemoryFiles files;
+    EXPECT_OK(made.write(files, "in.gt3x"));
+    auto found = survey(files, "in.gt3x");
+    EXPECT_OK(found);
+    return *std::move(found);
+  };
+  EXPECT_EQ(triage(found_with("1.5.0", "1.5.0").facts).verdict, Verdict::affected);
+  EXPECT_EQ(triage(found_with("1.5.0", "1.7.0").facts).verdict, Verdict::affected);
+  for (const auto& [first, behind] : {std::pair("1.5.0", "1.8.0"), std::pair("1.5.0", "1.6.0"),
+                                      std::pair("1.8.0", "1.5.0"), std::pair("1.6.0", "1.5.0")}) {
+    const Survey two = found_with(first, behind);
+    EXPECT_EQ(two.facts.other_firmware, behind);
+    EXPECT_EQ(triage(two.facts).verdict, Verdict::cannot_tell) << first << ", then " << behind;
+  }
+  EXPECT_EQ(filter_in_force(found_with("1.5.0", "1.8.0").facts), std::nullopt);
+}
+
+// The table of Survey::constants.
+TEST(Survey, ConstantsOfSamplesBeforeTheFirstCompleteRecord) {
+  tests::MadeRecording made = tests::six_sides();
+  const gt3x::ParameterValues whole = gt3x::parse_parameters(made.parameters())->values;
+  const auto record_of = [](const gt3x::ParameterValues& values) {
+    Bytes bytes;
+    gt3x::append_record(bytes, gt3x::RecordType::parameters, 7, gt3x::encode_parameters(values));
+    return bytes;
+  };
+  const std::size_t own = record_of(whole).size();
+  // `first` in the place of the recording's own PARAMETERS, which come at `second`.
+  const auto found_with = [&](const Bytes& first, std::size_t second) {
+    made.between = [&](std::size_t at) { return at == second ? record_of(whole) : Bytes{}; };
+    Bytes log = made.log();
+    log.erase(log.begin(), log.begin() + static_cast<std::ptrdiff_t>(own));
+    log.insert(log.begin(), first.begin(), first.end());
+    MemoryFiles files;
+    EXPECT_OK(made.write(files, "in.gt3x", log));
+    auto found = survey(files, "in.gt3x");
+    EXPECT_OK(found);
+    return *std::move(found);
+  };
+  const Survey plain = found_with(record_of(whole), 20);
+  EXPECT_TRUE(plain.notes.empty());
+  gt3x::ParameterValues eight = whole;
+  eight.erase({gt3x::kParameterUnitSpace, gt3x::kParameterZero});
+  gt3x::ParameterValues other = eight;
+  other[{gt3x::kParameterUnitSpace, gt3x::kParameterPositive}] = 400;
+  for (const Bytes& first : {Bytes{}, record_of(eight)}) {
+    const Survey found = found_with(first, 20);
+    EXPECT_EQ(found.constants, std::vector{made.constants});
+    EXPECT_FALSE(found.constants_problem);
+    ASSERT_EQ(found.notes.size(), 1U);
+    EXPECT_NE(found.notes[0].find("the first 600 samples stand before"), std::string::npos)
+        << found.notes[0];
+    ASSERT_EQ(found.blocks.size(), plain.blocks.size());
+    for (std::size_t i = 0; i < plain.blocks.size(); ++i) {
+      EXPECT_EQ(found.blocks[i].mean_lsb, plain.blocks[i].mean_lsb) << i;
+    }
+  }
+  const Survey contradicted = found_with(record_of(other), 20);
+  ASSERT_TRUE(contradicted.constants_problem);
+  EXPECT_NE(contradicted.constants_problem->what.find("is not known"), std::string::npos);
+  EXPECT_FALSE(found_with(record_of(other), 0).constants_problem) << "no samples of it";
+}
+
 TEST(Survey, AScaleThatCannotBeIsSaid) {
   MemoryFiles files;
   const tests::MadeRecording made = tests::six_sides();
