@@ -44,6 +44,8 @@ void Context::worsen(int code) {
   }
 }
 
+void Context::worsen_as_incomplete() { exit_code = std::max(exit_code, kExitInconclusive); }
+
 Json document(std::string_view command) {
   Json json;
   json["schema"] = fmt::format("sixpoint/{}/1", command);

@@ -66,6 +66,15 @@ struct Context {
   //   0 passed < 2 inconclusive < 1 failed < 3 stopped < 64 ... 78 errors, by their number
   void worsen(int code);
   void worsen(ErrorCode code) { worsen(static_cast<int>(code)); }
+
+  // To be called last, where the answer is about a part of what was asked for: what is known so far
+  // may not read as "done".
+  //
+  //   exit code so far              afterwards
+  //   0 passed, 1 failed            2 inconclusive
+  //   2 inconclusive, 3 stopped     the same
+  //   64 ... 78 errors              the same
+  void worsen_as_incomplete();
 };
 
 // {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.

@@ -241,7 +241,9 @@ class Merge {
   }
 
   void finish(const MergedArchive& merged) {
-    context_.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
+    if (!merged.complete()) {
+      context_.worsen_as_incomplete();
+    }
     const auto units = table_.rows();
     if (manifest_folder_) {
       report(repair::write_manifest(context_.env.files, *manifest_folder_, reports_,
