@@ -59,6 +59,33 @@ TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
 }
 
+// Without them the first file that is opened would get the number of a stream that is closed, and
+// what is printed would be written into it.
+TEST_F(Main, WhatIsPrintedOnAClosedStreamGoesIntoNoFile) {
+  const std::string jig = "jig --device virtual:seed=7,jig=auto --store " + (folder_ / "j.db") +
+                          " --record " + (folder_ / "r.zip");
+  EXPECT_EQ(run(jig + " >" + (folder_ / "o") + " 2>&-"), 0);
+  EXPECT_EQ(run("session show " + (folder_ / "r.zip") + to("o", "e")), 0) << text("e");
+  EXPECT_EQ(run("audit verify --store " + (folder_ / "j.db") + to("o", "e")), 0) << text("e");
+
+  std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
+    "motions": [{"kind": "free_living", "duration_s": 60}]})";
+  ASSERT_EQ(run("simulate --scenario " + (folder_ / "s.json") + " -o " + (folder_ / "r.gt3x") +
+                " <&- >" + (folder_ / "o") + " 2>&-"),
+            0);
+  EXPECT_EQ(run("inspect " + (folder_ / "r.gt3x") + to("o", "e")), 0) << text("e");
+  for (const std::string& streams : {" >&- 2>" + (folder_ / "e"), std::string(" <&- >&- 2>&-")}) {
+    SCOPED_TRACE(streams);
+    std::filesystem::remove_all(folder_ / "out");
+    EXPECT_EQ(run("repair " + (folder_ / "r.gt3x") + " --scan -o " + (folder_ / "out") + streams),
+              74)
+        << "the answer could not be written";
+    EXPECT_EQ(text("out/.sixpoint-repair.lock"), "");
+  }
+  EXPECT_THAT(text("e"), HasSubstr("standard output"));
+  EXPECT_EQ(run("inspect " + (folder_ / "r.gt3x") + to("o", "e")), 0) << text("e");
+}
+
 // In a command that has nothing to end in order: here one that would work for a long time.
 void Main::expect_ended_by(int signal) {
   std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
