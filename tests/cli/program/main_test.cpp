@@ -10,8 +10,13 @@
 
 #include <gmock/gmock.h>
 
+#include "base/env.h"
+#include "base/random.h"
 #include "cli/program/interrupts.h"
 #include "cli/run_child.h"
+#include "expect_result.h"
+#include "repair/jig_constants.h"
+#include "repair/made_recording.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::cli {
@@ -84,6 +89,42 @@ TEST_F(Main, WhatIsPrintedOnAClosedStreamGoesIntoNoFile) {
   }
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
   EXPECT_EQ(run("inspect " + (folder_ / "r.gt3x") + to("o", "e")), 0) << text("e");
+}
+
+// As a full disk: the work ends in order, and no part of a file stays.
+TEST_F(Main, AFileThatIsLargerThanItsLimitEndsAsOnAFullDisk) {
+  std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
+    "motions": [{"kind": "free_living", "duration_s": 1800}]})";
+  std::ofstream(folder_ / "c.json") << tests::kConstants;
+  const std::string recording = folder_ / "r.gt3x";
+  tests::MadeRecording made;
+  Random random(1);
+  for (int i = 0; i < 9000; ++i) {
+    made.raw.push_back({static_cast<int>(random.below(700)) - 300,
+                        static_cast<int>(random.below(700)) - 300,
+                        static_cast<int>(random.below(700)) - 300});
+  }
+  ASSERT_OK(made.write(posix_env().files, recording));
+  for (const std::string& work :
+       {"export " + recording + " --csv " + (folder_ / "out/x.csv"),
+        "simulate --scenario " + (folder_ / "s.json") + " -o " + (folder_ / "out/x.gt3x"),
+        "repair " + recording + " --constants " + (folder_ / "c.json") + " -o " +
+            (folder_ / "out")}) {
+    SCOPED_TRACE(work);
+    std::filesystem::remove_all(folder_ / "out");
+    std::filesystem::create_directory(folder_ / "out");
+    const std::string line =
+        "ulimit -f 16; " + std::string(SIXPOINT_PROGRAM) + " " + work + to("o", "e");
+    const int status = std::system(line.c_str());
+    ASSERT_TRUE(WIFEXITED(status)) << "a signal ended it";
+    EXPECT_EQ(WEXITSTATUS(status), 74);
+    EXPECT_THAT(text("o") + text("e"), testing::AllOf(HasSubstr("too large"), HasSubstr("ulimit")));
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "out")) {
+      EXPECT_FALSE(entry.path().filename().string().find("x.") != std::string::npos) << entry;
+      EXPECT_NE(entry.path().extension(), ".tmp") << entry;
+      EXPECT_NE(entry.path().extension(), ".gt3x") << entry;
+    }
+  }
 }
 
 // In a command that has nothing to end in order: here one that would work for a long time.
