@@ -80,6 +80,12 @@ struct Context {
 // {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.
 Json document(std::string_view command);
 
+// Writes a document to stdout, whole or not at all: the answer is there, so a signal that asks the
+// program to stop (stop_request.h) comes too late and changes nothing. The program must not have
+// threads that take it meanwhile. A reader that goes away (SIGPIPE) ends it as ever. Commands print
+// their documents by this and what is below.
+void write_document(Context& context, std::string_view text);
+
 // Prints one JSON document and a line end on stdout. This and the next one give a success, for
 // `return print_answer(...)` at the end of a command: run_program() reports an output that fails.
 Status print_json(Context& context, const Json& json);

@@ -208,7 +208,7 @@ class Merge {
       // Not there where no file had to be written.
       SIXPOINT_CHECK(make_synced_folders(context_.env.files, *manifest_folder_));
     }
-    files_.emplace(context_, options_.json);  // begins the JSON document
+    files_.emplace(context_, options_.json);
     return {};
   }
 
@@ -339,9 +339,8 @@ Status run_merge(const ArchiveOptions& options, Context& context) {
   };
   const auto merged = repair::merge_archive(context.env.files, folder, plan, how);
   progress.reset();
-  if (!merged) {  // the JSON document was begun: no second one
-    report_error(context, merged.error());
-    return {};
+  if (!merged) {
+    return fail(merged.error());
   }
   merge.finish(*merged);
   return {};

@@ -14,6 +14,7 @@
 
 #include "base/random.h"
 #include "cli/files/archive_fixture.h"
+#include "cli/files/file_stream.h"
 #include "db/store.h"
 #include "shared_data.h"
 
@@ -127,6 +128,21 @@ TEST_F(ArchiveCommand, AnArchiveThatIsNotCompleteIsNeverDone) {
   const Answer damaged = merge();
   EXPECT_EQ(damaged.json()["complete"], false);
   EXPECT_EQ(damaged.exit_code, 2) << "what is damaged is not known";
+}
+
+// So one that is stopped, or fails, on its way leaves no half of a document.
+TEST(FileStreamOfAnArchive, WritesItsDocumentAtTheEnd) {
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{posix_env(), out, people, in};
+  FileStream files(context, /*json=*/true);
+  files.add(Json{{"input", "a.gt3x"}});
+  files.add(Json{{"input", "b.gt3x"}});
+  EXPECT_EQ(out.str(), "");
+  files.end({{"complete", false}});
+  EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/archive/1",
+      "files": [{"input": "a.gt3x"}, {"input": "b.gt3x"}], "complete": false})"));
 }
 
 TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {

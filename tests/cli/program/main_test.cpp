@@ -195,6 +195,31 @@ TEST_F(Main, SighupDoesTheSame) { expect_ended_by(SIGHUP); }
 // As a pipe sends it whose reader has gone, such as `head`.
 TEST_F(Main, SigpipeDoesTheSameAndIsSilent) { expect_ended_by(SIGPIPE); }
 
+// The pipe takes some of the document, and nobody reads: the program is in the midst of it when the
+// signal comes.
+TEST_F(Main, ADocumentIsWholeAlsoWhenTheProgramIsStopped) {
+  std::filesystem::create_directory(folder_ / "archive");
+  std::vector<std::string> scan = {"scan", "--json"};
+  for (int i = 0; i < 1000; ++i) {
+    scan.push_back(folder_ / ("archive/" + std::to_string(i) + ".gt3x"));
+    std::ofstream(scan.back()) << "no recording";
+  }
+  const std::vector<std::string> plan = {"archive",        "plan",   folder_ / "archive", "-o",
+                                         folder_ / "plan", "--scan", "--dry-run",         "--json"};
+  for (const std::vector<std::string>& line : {scan, plan}) {
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+      SCOPED_TRACE(line.front() + " " + std::to_string(signal));
+      tests::Child child(line);
+      ASSERT_TRUE(child.fills_its_pipe());
+      child.send(signal);
+      const auto document = nlohmann::json::parse(child.rest(), nullptr, false);
+      ASSERT_TRUE(document.is_object()) << "a half";
+      EXPECT_EQ(document["files"].size(), 1000U);
+      EXPECT_EQ(child.wait(), line == scan ? 65 : 0) << "the signal came too late";
+    }
+  }
+}
+
 // A bar is for a terminal, and a file is none.
 TEST_F(Main, NoProgressIsDrawnIntoAFile) {
   std::ofstream(folder_ / "x.gt3x") << "no recording";
