@@ -462,7 +462,7 @@ void add_archive(CLI::App& app, Context& context) {
   plan.add_option("--shard-bytes", options.draft.shard_bytes,
                   "what a shard holds at most, such as 500MB (default: 4GB, 1000 shards at most)")
       ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::PositiveNumber)
+      ->check(greater_than_zero())
       ->excludes(shards);
   plan.add_option("--at-once", options.draft.at_once,
                   "tasks of the Slurm array at a time (default: 64; 0: no limit)")
