@@ -32,6 +32,10 @@ tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::
     case ENOSPC:
     case EDQUOT:
       return fail(ErrorCode::io, what, path, "free some space and run the command again");
+    case EFBIG:
+      return fail(ErrorCode::io, what, path,
+                  "raise the limit of a file's size ('ulimit -f'), or choose a disk that takes "
+                  "larger files, and run the command again");
     case ENOENT:
       return fail(otherwise, what, path, "check the path");
     case EEXIST:

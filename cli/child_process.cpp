@@ -30,7 +30,12 @@ tl::expected<pid_t, int> start_child(const std::vector<std::string>& words, int 
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  // And the one that it ignores (program/interrupts.h) does with the child what it usually does.
+  sigset_t usual;
+  sigemptyset(&usual);
+  sigaddset(&usual, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &usual);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
   pid_t process = 0;
   const int error =
       posix_spawnp(&process, list.front(), &actions, &attributes, list.data(), environ);

@@ -61,6 +61,10 @@ Declared<Options> add_command(CLI::App& parent, Context& context, const char* na
   return add_command<Options>(parent, context, name, name, about, work);
 }
 
+// The check of an option that takes a number greater than 0. CLI11's own (PositiveNumber) names the
+// largest number there is in its message, with all of its 309 digits.
+CLI::Validator greater_than_zero();
+
 // Declares a command that is a name for its subcommands.
 CLI::App& add_group(CLI::App& parent, const char* name, const char* about);
 

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <csignal>
+#include <ctime>
 #include <filesystem>
 
 #include <fmt/format.h>
 #include <spdlog/logger.h>
 #include <spdlog/sinks/ostream_sink.h>
 
+#include "cli/stop_request.h"
 #include "repair/batch/answers.h"
 
 namespace sixpoint::cli {
@@ -44,15 +47,32 @@ void Context::worsen(int code) {
   }
 }
 
+void Context::worsen_as_incomplete() { exit_code = std::max(exit_code, kExitInconclusive); }
+
 Json document(std::string_view command) {
   Json json;
   json["schema"] = fmt::format("sixpoint/{}/1", command);
   return json;
 }
 
+void write_document(Context& context, std::string_view text) {
+  sigset_t before;
+  sigset_t too_late = block_stop_signals(&before);
+  context.out << text << std::flush;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    if (sigismember(&before, signal) == 1) {
+      sigdelset(&too_late, signal);  // held back before: who did that asks for it
+    }
+  }
+  const timespec at_once{};
+  while (sigtimedwait(&too_late, nullptr, &at_once) > 0) {
+  }
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
 Status print_json(Context& context, const Json& json) {
   // A file may hold bytes that are not UTF-8: they are replaced.
-  context.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  write_document(context, json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
   return {};
 }
 

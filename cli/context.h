@@ -66,10 +66,25 @@ struct Context {
   //   0 passed < 2 inconclusive < 1 failed < 3 stopped < 64 ... 78 errors, by their number
   void worsen(int code);
   void worsen(ErrorCode code) { worsen(static_cast<int>(code)); }
+
+  // To be called last, where the answer is about a part of what was asked for: what is known so far
+  // may not read as "done".
+  //
+  //   exit code so far              afterwards
+  //   0 passed, 1 failed            2 inconclusive
+  //   2 inconclusive, 3 stopped     the same
+  //   64 ... 78 errors              the same
+  void worsen_as_incomplete();
 };
 
 // {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.
 Json document(std::string_view command);
+
+// Writes a document to stdout, whole or not at all: the answer is there, so a signal that asks the
+// program to stop (stop_request.h) comes too late and changes nothing. The program must not have
+// threads that take it meanwhile. A reader that goes away (SIGPIPE) ends it as ever. Commands print
+// their documents by this and what is below.
+void write_document(Context& context, std::string_view text);
 
 // Prints one JSON document and a line end on stdout. This and the next one give a success, for
 // `return print_answer(...)` at the end of a command: run_program() reports an output that fails.

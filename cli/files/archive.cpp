@@ -208,7 +208,7 @@ class Merge {
       // Not there where no file had to be written.
       SIXPOINT_CHECK(make_synced_folders(context_.env.files, *manifest_folder_));
     }
-    files_.emplace(context_, options_.json);  // begins the JSON document
+    files_.emplace(context_, options_.json);
     return {};
   }
 
@@ -241,7 +241,9 @@ class Merge {
   }
 
   void finish(const MergedArchive& merged) {
-    context_.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
+    if (!merged.complete()) {
+      context_.worsen_as_incomplete();
+    }
     const auto units = table_.rows();
     if (manifest_folder_) {
       report(repair::write_manifest(context_.env.files, *manifest_folder_, reports_,
@@ -337,9 +339,8 @@ Status run_merge(const ArchiveOptions& options, Context& context) {
   };
   const auto merged = repair::merge_archive(context.env.files, folder, plan, how);
   progress.reset();
-  if (!merged) {  // the JSON document was begun: no second one
-    report_error(context, merged.error());
-    return {};
+  if (!merged) {
+    return fail(merged.error());
   }
   merge.finish(*merged);
   return {};
@@ -461,7 +462,7 @@ void add_archive(CLI::App& app, Context& context) {
   plan.add_option("--shard-bytes", options.draft.shard_bytes,
                   "what a shard holds at most, such as 500MB (default: 4GB, 1000 shards at most)")
       ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::PositiveNumber)
+      ->check(greater_than_zero())
       ->excludes(shards);
   plan.add_option("--at-once", options.draft.at_once,
                   "tasks of the Slurm array at a time (default: 64; 0: no limit)")

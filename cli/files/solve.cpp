@@ -254,7 +254,8 @@ void add_solve(CLI::App& app, Context& context) {
                      "'population': where sides are missing, use what units of this model are "
                      "like; the result is marked and never verified");
   command.add_option("-o,--output", options.output,
-                     "write verified constants into this constants.json");
+                     "write verified constants into this constants.json; with --prior also those "
+                     "that rest on it, which are marked (from_prior) and not verified");
   add_output_options(command, options.outputs);
   command.add_flag("--save", options.save, "keep verified constants in the store");
   add_store_option(command, options.store);

@@ -14,6 +14,9 @@
 // | gap challenge --export  | remove the folder and begin again: it must be empty |
 // | others                  | what is done stays, and this line goes on: the line |
 //
+// A file that grows beyond the limit of a file's size (ulimit -f: SIGXFSZ) does not end the program:
+// the write fails as on a full disk, exit 74.
+//
 // In the background of a script, where the signal is ignored, it stays so.
 #pragma once
 

@@ -1,6 +1,8 @@
 #include "cli/program/program.h"
 
 #include <algorithm>
+#include <new>
+#include <system_error>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -52,16 +54,9 @@ std::string words_of_command(const CLI::App& app) {
   return words;
 }
 
-// A command line that is not understood; with --json also as the document of the command that was
-// chosen.
-void report_usage(const CLI::App& app, const std::vector<std::string>& arguments,
-                  const CLI::ParseError& refused, Context& context) {
-  Error error{ErrorCode::usage, printable(refused.what()), "",
-              fmt::format("'{} --help' lists what there is", words_of_command(app))};
-  if (auto unknown = unknown_word(app, arguments)) {
-    error.what = *std::move(unknown);
-    error.hint.clear();
-  }
+// With --json also as the document of the command that was chosen.
+void report_for_chosen(const CLI::App& app, const std::vector<std::string>& arguments,
+                       const Error& error, Context& context) {
   std::string schema;
   const CLI::App* command = &app;
   while (!command->get_subcommands().empty()) {
@@ -78,7 +73,41 @@ void report_usage(const CLI::App& app, const std::vector<std::string>& arguments
                    std::ranges::find(arguments, "--json") != arguments.end());
 }
 
+// A command line that is not understood.
+void report_usage(const CLI::App& app, const std::vector<std::string>& arguments,
+                  const CLI::ParseError& refused, Context& context) {
+  Error error{ErrorCode::usage, printable(refused.what()), "",
+              fmt::format("'{} --help' lists what there is", words_of_command(app))};
+  if (auto unknown = unknown_word(app, arguments)) {
+    error.what = *std::move(unknown);
+    error.hint.clear();
+  }
+  report_for_chosen(app, arguments, error, context);
+}
+
 }  // namespace
+
+Error error_of(const std::exception& exception) {
+  constexpr const char* kNoMemory = "not enough memory";
+  constexpr const char* kMoreMemory =
+      "end other programs, raise the limit ('ulimit -v', or the batch system's), or work on fewer "
+      "files at a time (--jobs)";
+  if (dynamic_cast<const std::bad_alloc*>(&exception) != nullptr) {
+    return {ErrorCode::io, kNoMemory, "", kMoreMemory};
+  }
+  if (const auto* of_system = dynamic_cast<const std::system_error*>(&exception)) {
+    if (of_system->code() == std::errc::not_enough_memory) {
+      return {ErrorCode::io, kNoMemory, "", kMoreMemory};
+    }
+    if (of_system->code() == std::errc::resource_unavailable_try_again) {
+      return {ErrorCode::io, "the system gives this program no more threads", "",
+              "end other programs, raise the limits ('ulimit -u', 'ulimit -v'), or work on fewer "
+              "files at a time (--jobs)"};
+    }
+  }
+  return {ErrorCode::internal, fmt::format("internal error: {}", printable(exception.what())), "",
+          "please report it with the command line"};
+}
 
 int run_program(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app("Sixpoint measures the constants of activity monitors and repairs their recordings.",
@@ -107,10 +136,7 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
     }
     app.exit(error, context.out, context.people);  // --help, --version
   } catch (const std::exception& error) {
-    // The libraries return errors as values: an exception is a defect of this program.
-    context.log().critical("internal error: {}; please report it with the command line",
-                           printable(error.what()));
-    return static_cast<int>(ErrorCode::internal);
+    report_for_chosen(app, arguments, error_of(error), context);
   }
   context.out.flush();
   if (!context.out) {

@@ -173,7 +173,7 @@ void add_gage_rr(CLI::App& app, Context& context) {
   command.add_option("--quantity", options.quantity, "of the runs")->capture_default_str();
   command.add_option("--axis", options.axis, "of the quantity")->capture_default_str();
   command.add_option("--tolerance", options.tolerance, "width of the specification")
-      ->check(CLI::PositiveNumber);
+      ->check(greater_than_zero());
   add_store_option(command, options.store);
 }
 

@@ -48,7 +48,11 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
       return {ErrorCode::io, what, path, "another program keeps the store busy; try again"};
     case SQLITE_FULL:
     case SQLITE_IOERR:
-      return {ErrorCode::io, what, path, "free some space on the disk and run the command again"};
+      return {ErrorCode::io, what, path,
+              "free some space on the disk, or raise the limit of a file's size ('ulimit -f'), and "
+              "run the command again"};
+    case SQLITE_NOMEM:
+      return {ErrorCode::io, what, path, "end other programs, or raise the limit of memory"};
     case SQLITE_CONSTRAINT:
       return {ErrorCode::bad_data, what, path,
               "the store keeps its history as it is; write a correction instead"};

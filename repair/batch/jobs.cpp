@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -37,7 +38,14 @@ void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std
   };
   std::vector<std::jthread> threads;
   for (unsigned i = 0; i < jobs && i < count; ++i) {
-    threads.emplace_back(run);
+    try {
+      threads.emplace_back(run);
+    } catch (const std::system_error&) {
+      if (threads.empty()) {
+        throw;
+      }
+      break;  // the system gives no more: those that are there do all the work
+    }
   }
   while (ended < threads.size()) {
     watch(done);

@@ -14,7 +14,8 @@ namespace sixpoint::repair {
 // How many threads `jobs` asks for; 0: one per core.
 unsigned threads_of(unsigned jobs);
 
-// Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
+// Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core), fewer where the
+// system gives no more; std::system_error where it gives none. Meanwhile
 // `watch(done)` is called on the calling thread, some fifty times a second. `work` must be safe to
 // call from several threads for different i. Once `stop` is set no further i is begun. An exception
 // of `work`, a defect, begins no further i and goes to the caller once all threads have ended.

@@ -147,7 +147,9 @@ class Repair {
     if (report_.method.empty()) {
       if (survey_.constants_problem.has_value()) {
         Error error = *survey_.constants_problem;
-        error.hint = kNotUndone;
+        if (survey_.samples > 0) {  // else there is nothing to be undone, and the hint stays
+          error.hint = kNotUndone;
+        }
         return fail(std::move(error));
       }
       SIXPOINT_CHECK(choose());

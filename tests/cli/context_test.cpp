@@ -29,6 +29,19 @@ TEST(Context, TheWorseExitCodeIsKept) {
   }
 }
 
+// Oracle: the table of Context::worsen_as_incomplete().
+TEST(Context, APartIsNeverDone) {
+  std::ostringstream stream;
+  std::istringstream in;
+  for (const auto& [before, after] :
+       std::map<int, int>{{0, 2}, {1, 2}, {2, 2}, {3, 3}, {64, 64}, {65, 65}, {78, 78}}) {
+    Context context{posix_env(), stream, stream, in};
+    context.worsen(before);
+    context.worsen_as_incomplete();
+    EXPECT_EQ(context.exit_code, after);
+  }
+}
+
 TEST(Context, AnErrorIsOneLineForPeopleAndADocumentWithJson) {
   std::ostringstream out;
   std::ostringstream people;

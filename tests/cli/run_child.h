@@ -6,12 +6,16 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -69,6 +73,29 @@ class Child {
     }
     return nlohmann::json::parse(text);
   }
+  // All that comes until it closes its standard output.
+  std::string rest() {
+    std::string text;
+    std::array<char, 4096> part{};
+    for (auto count = ::read(out_, part.data(), part.size()); count > 0;
+         count = ::read(out_, part.data(), part.size())) {
+      text.append(part.data(), static_cast<std::size_t>(count));
+    }
+    return text;
+  }
+  // Waits until its output fills the pipe, which nobody reads: it is in the midst of writing.
+  bool fills_its_pipe() const {
+    const int room = ::fcntl(out_, F_GETPIPE_SZ);
+    for (int hundredths = 0; hundredths < 6000; ++hundredths) {
+      int unread = 0;
+      if (::ioctl(out_, FIONREAD, &unread) == 0 && unread >= room) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  }
+  void send(int signal) const { ::kill(child_, signal); }
   // Its exit code; -1 where a signal ended it.
   int stop(int signal) {
     ::kill(child_, signal);

@@ -14,6 +14,7 @@
 
 #include "base/random.h"
 #include "cli/files/archive_fixture.h"
+#include "cli/files/file_stream.h"
 #include "db/store.h"
 #include "shared_data.h"
 
@@ -24,6 +25,7 @@ using testing::HasSubstr;
 using tests::Answer;
 using tests::ArchiveCommand;
 using tests::kConstants;
+using tests::MadeRecording;
 using tests::some_minutes;
 
 TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
@@ -105,6 +107,42 @@ TEST_F(ArchiveCommand, MissingAndFailedShardsAreNamedWithTheirCommand) {
   }
   EXPECT_THAT(again, HasSubstr(" --shard " + std::to_string(broken) + " "));
   EXPECT_EQ(run({"archive", "status", plan_, "--json"}).json()["summary"]["failed"], 1);
+}
+
+TEST_F(ArchiveCommand, AnArchiveThatIsNotCompleteIsNeverDone) {
+  EXPECT_OK(some_minutes(1, 900).write(files_, archive_ + "/a.gt3x"));
+  MadeRecording stranger = some_minutes(2, 900);
+  stranger.serial = "MOS2A45130451";
+  EXPECT_OK(stranger.write(files_, archive_ + "/b.gt3x"));
+  const Json planned = plan({"--shards", "2"}).json();
+  const std::size_t of_stranger = shard_of(planned, "b.gt3x");
+  EXPECT_EQ(run_shard(of_stranger).exit_code, 1) << "the constants are those of another unit";
+  const Answer merged = merge();
+  EXPECT_EQ(merged.json()["summary"]["not_repairable"], 1);
+  EXPECT_EQ(merged.json()["complete"], false);
+  EXPECT_EQ(merged.exit_code, 2) << "the other shard never ran";
+  run_shard(1 - of_stranger);
+  EXPECT_EQ(merge().exit_code, 1) << "now all is known";
+  std::ofstream(plan_ + "/results/0000" + std::to_string(1 - of_stranger) + ".jsonl", std::ios::app)
+      << "x";
+  const Answer damaged = merge();
+  EXPECT_EQ(damaged.json()["complete"], false);
+  EXPECT_EQ(damaged.exit_code, 2) << "what is damaged is not known";
+}
+
+// So one that is stopped, or fails, on its way leaves no half of a document.
+TEST(FileStreamOfAnArchive, WritesItsDocumentAtTheEnd) {
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{posix_env(), out, people, in};
+  FileStream files(context, /*json=*/true);
+  files.add(Json{{"input", "a.gt3x"}});
+  files.add(Json{{"input", "b.gt3x"}});
+  EXPECT_EQ(out.str(), "");
+  files.end({{"complete", false}});
+  EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/archive/1",
+      "files": [{"input": "a.gt3x"}, {"input": "b.gt3x"}], "complete": false})"));
 }
 
 TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {

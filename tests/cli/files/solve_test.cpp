@@ -131,6 +131,11 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.exit_code, 1);
   EXPECT_TRUE(with_prior.json()["from_prior"].get<bool>());
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
+  // As the help of -o says.
+  EXPECT_EQ(run({"solve", path, "--prior", "population", "-o", output}).exit_code, 1);
+  std::ifstream written(output);
+  EXPECT_EQ(Json::parse(written)["from_prior"], true);
+  EXPECT_THAT(run({"solve", "--help"}).out, testing::HasSubstr("(from_prior)"));
 }
 
 // Good constants of the wrong filter: who keeps them must know that they repair nothing.

@@ -10,8 +10,13 @@
 
 #include <gmock/gmock.h>
 
+#include "base/env.h"
+#include "base/random.h"
 #include "cli/program/interrupts.h"
 #include "cli/run_child.h"
+#include "expect_result.h"
+#include "repair/jig_constants.h"
+#include "repair/made_recording.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::cli {
@@ -57,6 +62,69 @@ TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
   EXPECT_EQ(run("limits print >/dev/full 2>" + (folder_ / "e")), 74);
   EXPECT_EQ(run("scan --help >/dev/full 2>" + (folder_ / "e")), 74);
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
+}
+
+// Without them the first file that is opened would get the number of a stream that is closed, and
+// what is printed would be written into it.
+TEST_F(Main, WhatIsPrintedOnAClosedStreamGoesIntoNoFile) {
+  const std::string jig = "jig --device virtual:seed=7,jig=auto --store " + (folder_ / "j.db") +
+                          " --record " + (folder_ / "r.zip");
+  EXPECT_EQ(run(jig + " >" + (folder_ / "o") + " 2>&-"), 0);
+  EXPECT_EQ(run("session show " + (folder_ / "r.zip") + to("o", "e")), 0) << text("e");
+  EXPECT_EQ(run("audit verify --store " + (folder_ / "j.db") + to("o", "e")), 0) << text("e");
+
+  std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
+    "motions": [{"kind": "free_living", "duration_s": 60}]})";
+  ASSERT_EQ(run("simulate --scenario " + (folder_ / "s.json") + " -o " + (folder_ / "r.gt3x") +
+                " <&- >" + (folder_ / "o") + " 2>&-"),
+            0);
+  EXPECT_EQ(run("inspect " + (folder_ / "r.gt3x") + to("o", "e")), 0) << text("e");
+  for (const std::string& streams : {" >&- 2>" + (folder_ / "e"), std::string(" <&- >&- 2>&-")}) {
+    SCOPED_TRACE(streams);
+    std::filesystem::remove_all(folder_ / "out");
+    EXPECT_EQ(run("repair " + (folder_ / "r.gt3x") + " --scan -o " + (folder_ / "out") + streams),
+              74)
+        << "the answer could not be written";
+    EXPECT_EQ(text("out/.sixpoint-repair.lock"), "");
+  }
+  EXPECT_THAT(text("e"), HasSubstr("standard output"));
+  EXPECT_EQ(run("inspect " + (folder_ / "r.gt3x") + to("o", "e")), 0) << text("e");
+}
+
+// As a full disk: the work ends in order, and no part of a file stays.
+TEST_F(Main, AFileThatIsLargerThanItsLimitEndsAsOnAFullDisk) {
+  std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
+    "motions": [{"kind": "free_living", "duration_s": 1800}]})";
+  std::ofstream(folder_ / "c.json") << tests::kConstants;
+  const std::string recording = folder_ / "r.gt3x";
+  tests::MadeRecording made;
+  Random random(1);
+  for (int i = 0; i < 9000; ++i) {
+    made.raw.push_back({static_cast<int>(random.below(700)) - 300,
+                        static_cast<int>(random.below(700)) - 300,
+                        static_cast<int>(random.below(700)) - 300});
+  }
+  ASSERT_OK(made.write(posix_env().files, recording));
+  for (const std::string& work :
+       {"export " + recording + " --csv " + (folder_ / "out/x.csv"),
+        "simulate --scenario " + (folder_ / "s.json") + " -o " + (folder_ / "out/x.gt3x"),
+        "repair " + recording + " --constants " + (folder_ / "c.json") + " -o " +
+            (folder_ / "out")}) {
+    SCOPED_TRACE(work);
+    std::filesystem::remove_all(folder_ / "out");
+    std::filesystem::create_directory(folder_ / "out");
+    const std::string line =
+        "ulimit -f 16; " + std::string(SIXPOINT_PROGRAM) + " " + work + to("o", "e");
+    const int status = std::system(line.c_str());
+    ASSERT_TRUE(WIFEXITED(status)) << "a signal ended it";
+    EXPECT_EQ(WEXITSTATUS(status), 74);
+    EXPECT_THAT(text("o") + text("e"), testing::AllOf(HasSubstr("too large"), HasSubstr("ulimit")));
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "out")) {
+      EXPECT_FALSE(entry.path().filename().string().find("x.") != std::string::npos) << entry;
+      EXPECT_NE(entry.path().extension(), ".tmp") << entry;
+      EXPECT_NE(entry.path().extension(), ".gt3x") << entry;
+    }
+  }
 }
 
 // In a command that has nothing to end in order: here one that would work for a long time.
@@ -126,6 +194,31 @@ TEST_F(Main, SighupDoesTheSame) { expect_ended_by(SIGHUP); }
 
 // As a pipe sends it whose reader has gone, such as `head`.
 TEST_F(Main, SigpipeDoesTheSameAndIsSilent) { expect_ended_by(SIGPIPE); }
+
+// The pipe takes some of the document, and nobody reads: the program is in the midst of it when the
+// signal comes.
+TEST_F(Main, ADocumentIsWholeAlsoWhenTheProgramIsStopped) {
+  std::filesystem::create_directory(folder_ / "archive");
+  std::vector<std::string> scan = {"scan", "--json"};
+  for (int i = 0; i < 1000; ++i) {
+    scan.push_back(folder_ / ("archive/" + std::to_string(i) + ".gt3x"));
+    std::ofstream(scan.back()) << "no recording";
+  }
+  const std::vector<std::string> plan = {"archive",        "plan",   folder_ / "archive", "-o",
+                                         folder_ / "plan", "--scan", "--dry-run",         "--json"};
+  for (const std::vector<std::string>& line : {scan, plan}) {
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+      SCOPED_TRACE(line.front() + " " + std::to_string(signal));
+      tests::Child child(line);
+      ASSERT_TRUE(child.fills_its_pipe());
+      child.send(signal);
+      const auto document = nlohmann::json::parse(child.rest(), nullptr, false);
+      ASSERT_TRUE(document.is_object()) << "a half";
+      EXPECT_EQ(document["files"].size(), 1000U);
+      EXPECT_EQ(child.wait(), line == scan ? 65 : 0) << "the signal came too late";
+    }
+  }
+}
 
 // A bar is for a terminal, and a file is none.
 TEST_F(Main, NoProgressIsDrawnIntoAFile) {

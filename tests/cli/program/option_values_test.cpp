@@ -40,6 +40,25 @@ void expect_usage(const std::vector<std::string>& arguments, const std::string& 
   EXPECT_THAT(answer.people, HasSubstr(why)) << line;
 }
 
+// Not with a number of 309 digits, which is the largest one that there is.
+TEST(OptionValues, ANumberThatMustBeGreaterThanZeroSaysSo) {
+  const std::vector<std::string> plan = {"archive", "plan", "a", "-o", "p", "--shard-bytes"};
+  const std::vector<std::string> gage = {"gage-rr", "g.csv", "--tolerance"};
+  const auto with = [](std::vector<std::string> line, const char* value) {
+    line.emplace_back(value);
+    return line;
+  };
+  expect_usage(with(plan, "0"), "--shard-bytes: 0 is not greater than 0; ");
+  expect_usage(with(plan, "0kB"), "--shard-bytes: 0 is not greater than 0; ");
+  expect_usage(with(gage, "0"), "--tolerance: 0 is not greater than 0; ");
+  expect_usage(with(gage, "-1.5"), "--tolerance: -1.5 is not greater than 0; ");
+  expect_usage(with(gage, "abc"), "--tolerance: ");
+  MemoryEnv memory;
+  for (const auto& line : {with(plan, "1"), with(gage, "1e-6")}) {
+    EXPECT_EQ(tests::run_command(memory.env, line).exit_code, 66) << "the input is not there";
+  }
+}
+
 TEST(OptionValues, AnEmptyValueIsNotTakenForAnOptionThatIsMissing) {
   for (const std::vector<std::string>& arguments : {
            std::vector<std::string>{"repair", "a.gt3x", "-o", "out", "--constants", ""},

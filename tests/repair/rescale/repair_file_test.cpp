@@ -510,6 +510,17 @@ TEST_F(RepairFile, DividesByNoZero) {
   EXPECT_THAT(repair().error.value_or(Error{}).hint, testing::HasSubstr("no other constants help"));
 }
 
+TEST_F(RepairFile, AFileWithoutSamplesSaysNothingOfConstants) {
+  MadeRecording made = six_sides();
+  made.raw.clear();
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  const Error error = repair().error.value_or(Error{});
+  EXPECT_EQ(error.code, ErrorCode::bad_data);
+  EXPECT_THAT(error.what, testing::HasSubstr("no samples"));
+  EXPECT_THAT(error.hint, testing::HasSubstr("download it from the unit again"));
+  EXPECT_THAT(error.brief(), testing::Not(testing::HasSubstr("constants")));
+}
+
 TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
   MadeRecording made = six_sides();
   gt3x::ParameterValues values;
