@@ -1,6 +1,6 @@
 // Texts and JSON documents as values of Python, and back.
 //
-//   const py::dict answer = dict_of(document);
+//   const pybind11::dict answer = dict_of(document);
 //   const repair::Json options = json_of(given);
 //
 // Names of files may hold bytes that are no UTF-8, and errors and answers hold names. Python's text has
