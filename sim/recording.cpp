@@ -154,13 +154,14 @@ void append_second(Bytes& log, UtcTime time, std::span<const gt3x::Counts> sampl
                       unix_time(time), payload);
 }
 
-gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz) {
+gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz,
+                          int battery_mv) {
   gt3x::Info info;
   const auto ticks = [](UtcTime time) { return std::to_string(gt3x::to_ticks(time)); };
   info.set("Serial Number", unit.serial);
   info.set("Device Type", unit.serial.starts_with("MOS") ? "wGT3XBT" : "GT9X Link");
   info.set("Firmware", unit.firmware);
-  info.set("Battery Voltage", "4.17");
+  info.set("Battery Voltage", fmt::format("{:.2f}", battery_mv / 1000.0));
   info.set("Sample Rate", std::to_string(rate_hz));
   info.set("Start Date", ticks(start));
   info.set("Stop Date", "0");

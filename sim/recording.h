@@ -23,8 +23,11 @@ Bytes log_preamble(const UnitTruth& unit, UtcTime start, int rate_hz);
 // One second of samples as an ACTIVITY (12 bits) or ACTIVITY2 record (16).
 void append_second(Bytes& log, UtcTime time, std::span<const gt3x::Counts> samples, bool wide);
 
-// info.txt. `end` is the time after the last sample.
-gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz);
+// info.txt. `end` is the time after the last sample; `battery_mv` as the unit has it when the file is
+// made.
+inline constexpr int kFullBattery_mv = 4170;
+gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz,
+                          int battery_mv = kFullBattery_mv);
 
 struct RecordingReport {
   std::uint64_t samples = 0;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
+#include "base/text/json_keys.h"
 #include "sim/firmware.h"
 #include "sim/scenario.h"
 #include "sim/scenario_section.h"
@@ -479,6 +480,9 @@ Result<Scenario> parse_document(const Json& json) {
 }  // namespace
 
 Result<Scenario> parse_scenario(std::string_view json) {
+  if (const auto doubled = doubled_json_key(json)) {
+    return wrong(*doubled, "this key stands twice");
+  }
   const Json document = Json::parse(json, nullptr, false);
   if (document.is_discarded()) {
     return wrong("", "this is not JSON");

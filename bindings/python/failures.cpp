@@ -1,5 +1,7 @@
 #include "bindings/python/failures.h"
 
+#include "bindings/python/values.h"
+
 namespace sixpoint::python {
 
 namespace py = pybind11;
@@ -13,9 +15,10 @@ void register_failures(py::module_& /*module*/) {
       }
     } catch (const Failure& failure) {
       const Error& error = failure.error;
-      const py::object made = py::module_::import("sixpoint._errors")
-                                  .attr("error_of")(std::string(to_string(error.code)), error.what,
-                                                    error.where, error.hint);
+      const py::object made =
+          py::module_::import("sixpoint._errors")
+              .attr("error_of")(std::string(to_string(error.code)), text_of(error.what),
+                                text_of(error.where), text_of(error.hint));
       PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(made.ptr())), made.ptr());
     }
   });

@@ -1,5 +1,5 @@
 // The extension module sixpoint._core: what the Python files of the package call. Answers are JSON
-// documents, which sixpoint/_answers.py turns into dataclasses.
+// documents as dicts, which sixpoint/_answers.py turns into dataclasses.
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -12,8 +12,10 @@
 
 #include "bindings/python/failures.h"
 #include "bindings/python/reading.h"
+#include "bindings/python/values.h"
 #include "bindings/python/watched.h"
 #include "calib/poses/efficiency.h"
+#include "calib/poses/gravity.h"
 #include "calib/solve.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/requests.h"
@@ -27,11 +29,6 @@ namespace {
 
 namespace py = pybind11;
 using repair::Json;
-
-// Paths may hold bytes that are no UTF-8.
-std::string text_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
 
 gt3x::RowValue value_of(const std::string& unit, const std::string& dtype) {
   if (unit == "lsb") {
@@ -52,48 +49,55 @@ std::unique_ptr<Reading> open_reading(const std::string& path, const std::string
   return std::make_unique<Reading>(path, options);
 }
 
-std::string inspect(const std::string& path, bool salvage) {
+py::dict inspect(const std::string& path, bool salvage) {
   Watched watched;
   const auto found = watched.run([&] {
     return repair::inspect(watched.files(), path, {salvage, {}});
   });
-  return text_of(repair::inspection_to_json(value_or_throw(found), path));
+  return dict_of(repair::inspection_to_json(value_or_throw(found), path));
 }
 
 // The answer of run_scan() and run_repair(), which are watched on this thread.
 template <class Request>
-std::string answer_of(const std::vector<std::string>& paths, const std::string& options,
-                      Request request,
-                      Result<Json> (*run)(Env&, const Request&, const repair::Watching&)) {
+py::dict answer_of(const std::vector<std::string>& paths, const py::dict& options, Request request,
+                   Result<Json> (*run)(Env&, const Request&, const repair::Watching&)) {
   request.paths = paths;
-  value_or_throw(repair::take_options(options, request));
+  value_or_throw(repair::take_parsed_options(json_of(options), request));
   Watched watched;
   const auto answer = [&] {
     const py::gil_scoped_release released;
     return run(watched.env(), request, {[&](std::size_t) { watched.look(); }, &watched.stop()});
   }();
   watched.rethrow();
-  return text_of(value_or_throw(answer));
+  return dict_of(value_or_throw(answer));
 }
 
-std::string scan(const std::vector<std::string>& paths, const std::string& options) {
+py::dict scan(const std::vector<std::string>& paths, const py::dict& options) {
   return answer_of(paths, options, repair::ScanRequest{}, &repair::run_scan);
 }
 
-std::string repair_into(const std::vector<std::string>& paths, const std::string& folder,
-                        const std::string& options) {
+py::dict repair_into(const std::vector<std::string>& paths, const std::string& folder,
+                     const py::dict& options) {
   repair::RepairRequest request;
   request.folder = folder;
   return answer_of(paths, options, std::move(request), &repair::run_repair);
 }
 
-std::string solve(const std::string& path, const std::string& method,
-                  std::optional<std::uint64_t> seed, bool strict_nonzero, bool population_prior) {
+py::dict solve(const std::string& path, const std::string& method,
+               std::optional<std::uint64_t> seed, bool strict_nonzero, bool population_prior,
+               std::optional<double> gravity_m_per_s2, std::optional<double> latitude_deg,
+               std::optional<double> altitude_m) {
   Watched watched;
   auto report = watched.run([&]() -> Result<calib::SolveReport> {
     calib::SolveOptions options;
     SIXPOINT_ASSIGN(options.method, calib::parse_solve_method(method));
     options.seed = seed.value_or(options.seed);
+    SIXPOINT_ASSIGN(const auto gravity,
+                    calib::local_gravity({gravity_m_per_s2, latitude_deg, altitude_m}));
+    if (gravity) {
+      options.gravity_g = gravity->g();
+      options.gravity_sd_g = gravity->sd_g();
+    }
     calib::StillBlockOptions still;
     still.strict_nonzero = strict_nonzero;
     SIXPOINT_ASSIGN(const repair::Survey found, repair::survey(watched.files(), path, still));
@@ -113,7 +117,7 @@ std::string solve(const std::string& path, const std::string& method,
   Json json;
   json["file"] = path;
   json.update(calib::solve_json(value_or_throw(std::move(report))));
-  return text_of(json);
+  return dict_of(json);
 }
 
 }  // namespace
@@ -130,12 +134,16 @@ PYBIND11_MODULE(_core, module) {
       .def("block", &Reading::block, py::arg("most"))
       .def("times_ns", &Reading::times_ns, py::arg("first_row"), py::arg("rows"))
       .def("rows", &Reading::rows)
+      .def("runs", &Reading::runs)
+      .def("rate_hz", &Reading::rate_hz)
       .def("gaps", &Reading::gaps)
       .def("facts", &Reading::facts)
       .def("info", &Reading::info);
   module.def("inspect", &inspect, py::arg("path"), py::arg("salvage"));
   module.def("scan", &scan, py::arg("paths"), py::arg("options"));
   module.def("solve", &solve, py::arg("path"), py::arg("method"), py::arg("seed"),
-             py::arg("strict_nonzero"), py::arg("population_prior"));
+             py::arg("strict_nonzero"), py::arg("population_prior"), py::arg("gravity_m_per_s2"),
+             py::arg("latitude_deg"), py::arg("altitude_m"));
+  module.def("times_of_runs", &times_of_runs, py::arg("runs"), py::arg("rate_hz"), py::arg("rows"));
   module.def("repair", &repair_into, py::arg("paths"), py::arg("folder"), py::arg("options"));
 }

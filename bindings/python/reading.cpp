@@ -1,9 +1,11 @@
 #include "bindings/python/reading.h"
 
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "bindings/python/failures.h"
+#include "bindings/python/values.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/reading.h"
 
@@ -110,15 +112,27 @@ py::array Reading::times_ns(std::uint64_t first_row, std::uint64_t rows) {
 
 std::uint64_t Reading::rows() const { return stream_->rows(); }
 
-std::string Reading::facts() {
-  const py::gil_scoped_release released;
-  const std::scoped_lock lock(mutex_);
-  const repair::Inspection found =
-      value_or_throw(repair::reading_of(*recording_, *stream_, options_.salvage));
+std::uint64_t Reading::rate_hz() const { return stream_->rate_hz(); }
+
+py::array Reading::runs() const {
+  const auto& runs = stream_->runs();
+  py::array_t<std::int64_t> list({static_cast<py::ssize_t>(runs.size()), py::ssize_t{2}});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const auto row = static_cast<py::ssize_t>(i);
+    list.mutable_at(row, 0) = static_cast<std::int64_t>(runs[i].first_row);
+    list.mutable_at(row, 1) = runs[i].unix_time;
+  }
+  return list;
+}
+
+py::dict Reading::facts() {
+  const repair::Inspection found = [this] {
+    const py::gil_scoped_release released;
+    const std::scoped_lock lock(mutex_);
+    return value_or_throw(repair::reading_of(*recording_, *stream_, options_.salvage));
+  }();
   gaps_ = found.gaps;
-  // info.txt may hold bytes that are no UTF-8.
-  return repair::inspection_to_json(found, path_)
-      .dump(-1, ' ', false, repair::Json::error_handler_t::replace);
+  return dict_of(repair::inspection_to_json(found, path_));
 }
 
 py::list Reading::gaps() const {
@@ -135,6 +149,23 @@ py::list Reading::info() const {
     pairs.append(py::make_tuple(py::bytes(key), py::bytes(value)));
   }
   return pairs;
+}
+
+py::array times_of_runs(const py::array_t<std::int64_t, py::array::c_style>& runs,
+                        std::uint64_t rate_hz, std::uint64_t rows) {
+  if (runs.ndim() != 2 || runs.shape(1) != 2 || rate_hz == 0 || (rows > 0 && runs.shape(0) == 0)) {
+    throw py::value_error("these are no runs of rows");
+  }
+  std::vector<gt3x::RowRun> list;
+  for (py::ssize_t i = 0; i < runs.shape(0); ++i) {
+    list.push_back(
+        {static_cast<std::uint64_t>(runs.at(i, 0)), static_cast<std::uint32_t>(runs.at(i, 1))});
+  }
+  py::array_t<std::int64_t> times(static_cast<py::ssize_t>(rows));
+  std::int64_t* const memory = times.mutable_data();
+  const py::gil_scoped_release released;
+  gt3x::row_times_ns(list, rate_hz, 0, std::span(memory, static_cast<std::size_t>(rows)));
+  return times;
 }
 
 }  // namespace sixpoint::python

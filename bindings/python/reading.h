@@ -37,8 +37,11 @@ class Reading {
   pybind11::array times_ns(std::uint64_t first_row, std::uint64_t rows);
   std::uint64_t rows() const;
 
+  std::uint64_t rate_hz() const;
+  pybind11::array runs() const;  // of the rows so far, m x 2: first row, Unix time (gt3x::RowRun)
+
   // Behind the end: a JSON document, as repair::reading_of().
-  std::string facts();
+  pybind11::dict facts();
   pybind11::list gaps() const;  // behind facts(): (Unix time, seconds, kind)
   pybind11::list info() const;  // pairs of info.txt
 
@@ -50,5 +53,9 @@ class Reading {
   std::optional<gt3x::SampleStream> stream_;
   std::vector<gt3x::Gap> gaps_;
 };
+
+// Reading::times_ns(0, rows) by what Reading::runs() and rate_hz() were; the reading may be gone.
+pybind11::array times_of_runs(const pybind11::array_t<std::int64_t, pybind11::array::c_style>& runs,
+                              std::uint64_t rate_hz, std::uint64_t rows);
 
 }  // namespace sixpoint::python

@@ -51,6 +51,20 @@ Result<LocalGravity> gravity_entered(double m_per_s2) {
   return LocalGravity{m_per_s2, 1e-4};
 }
 
+Result<std::optional<LocalGravity>> local_gravity(const GravityGiven& given) {
+  if (given.m_per_s2) {
+    return gravity_entered(*given.m_per_s2);
+  }
+  if (given.latitude_deg) {
+    return gravity_at(*given.latitude_deg, given.altitude_m.value_or(0));
+  }
+  if (given.altitude_m) {
+    return fail(ErrorCode::usage, "an altitude alone does not say what gravity is", "gravity",
+                "give the latitude too");
+  }
+  return std::nullopt;
+}
+
 LocalGravity gravity_unknown() {
   return {kStandardGravity_m_per_s2, (9.832 - 9.780) / std::sqrt(12.0)};
 }

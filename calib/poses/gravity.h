@@ -9,6 +9,8 @@
 // 0.1 mg and stated as uncertainty.
 #pragma once
 
+#include <optional>
+
 #include "base/result.h"
 
 namespace sixpoint::calib {
@@ -27,5 +29,20 @@ Result<LocalGravity> gravity_entered(double m_per_s2);
 // For an unknown place, somewhere on land between equator and pole: standard gravity, known to
 // 0.0150 m/s2 (a uniform distribution over 9.780 .. 9.832).
 LocalGravity gravity_unknown();
+
+// What a person gives, of the commands and packages that compute constants.
+struct GravityGiven {
+  std::optional<double> m_per_s2;
+  std::optional<double> latitude_deg;
+  std::optional<double> altitude_m;  // without: sea level
+};
+
+//   m_per_s2  latitude  altitude  answer
+//   given     any       any       gravity_entered()
+//   -         given     any       gravity_at() both
+//   -         -         given     usage: an altitude alone says nothing
+//   -         -         -         none: gravity is unknown
+// usage where a value is impossible.
+Result<std::optional<LocalGravity>> local_gravity(const GravityGiven& given);
 
 }  // namespace sixpoint::calib

@@ -8,6 +8,7 @@
 #include <zip.h>
 
 #include "base/sha256.h"
+#include "base/text/json_keys.h"
 #include "device/session/session_archive.h"
 #include "device/session/session_journal.h"
 #include "gt3x/recording_writer.h"
@@ -210,6 +211,9 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
   }
   const std::unique_ptr<zip_t, CloseZip> zip(opened);
   SIXPOINT_ASSIGN(const std::string head_text, entry_of(*zip, kHeadName, path));
+  if (const auto doubled = doubled_json_key(head_text)) {
+    return broken(fmt::format("session.json has the key {} twice", printable(*doubled, 100)), path);
+  }
   const Json head = Json::parse(head_text, nullptr, false);
   const auto member = [&head](const char* key) {
     return head.is_object() && head.contains(key) ? head[key] : Json();
@@ -238,6 +242,13 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
     return fail(std::move(what));
   }
   session.transfers = std::move(*transfers);
+  // The hash is of the transfers alone: what session.json says about them is checked by itself.
+  if (const Json said = member("transfers");
+      !said.is_number_unsigned() || said.get<std::uint64_t>() != session.transfers.size()) {
+    return broken(fmt::format("session.json does not say that there are {} transfers",
+                              session.transfers.size()),
+                  path);
+  }
   return session;
 }
 

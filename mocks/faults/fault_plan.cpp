@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/serial.h"
+#include "base/text/json_keys.h"
 
 namespace sixpoint::mocks {
 
@@ -216,6 +217,9 @@ std::string_view to_string(FaultKind kind) {
 bool is_of_transfer(FaultKind kind) { return kind <= FaultKind::wrong_sequence; }
 
 Result<FaultPlan> parse_fault_plan(std::string_view text) {
+  if (const auto doubled = doubled_json_key(text)) {
+    return wrong(*doubled, "this key stands twice");
+  }
   const Json json = Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object()) {
     return wrong("", "this is no JSON object");

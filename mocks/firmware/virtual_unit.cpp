@@ -64,9 +64,17 @@ nanoseconds VirtualUnit::jumped_until(nanoseconds at) const {
   return sum;
 }
 
+nanoseconds VirtualUnit::device_time(nanoseconds at) const {
+  nanoseconds time = at - power_on_;
+  for (const ClockJump& jump : clock_jumps_) {
+    time += jump.at <= at ? jump.device_time_by : nanoseconds::zero();
+  }
+  return time;
+}
+
 std::uint64_t VirtualUnit::device_time_us(nanoseconds at) const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(
-      0, std::chrono::floor<std::chrono::microseconds>(at - power_on_ + jumped_until(at)).count()));
+      0, std::chrono::floor<std::chrono::microseconds>(device_time(at)).count()));
 }
 
 void VirtualUnit::lose_cable() {
@@ -84,7 +92,7 @@ void VirtualUnit::freeze_sensor(const PerAxis<bool>& axes, nanoseconds now) {
 }
 
 void VirtualUnit::jump_clock(nanoseconds jump, nanoseconds now) {
-  clock_jumps_.push_back({now, jump});
+  clock_jumps_.push_back({now, jump, std::max(jump, -device_time(now))});
 }
 
 void VirtualUnit::spoil_page() {
@@ -253,9 +261,9 @@ void VirtualUnit::finish_recording(nanoseconds now) {
   auto writer = gt3x::RecordingWriter::create(files, name, how);
   Bytes image;
   if (writer && writer->add("log.bin", std::move(log)) &&
-      writer->add(
-          "info.txt",
-          sim::recording_info(options_.truth, run.start_time, end, run.rate_hz).serialise()) &&
+      writer->add("info.txt", sim::recording_info(options_.truth, run.start_time, end, run.rate_hz,
+                                                  options_.battery_mv)
+                                  .serialise()) &&
       writer->commit()) {
     image = read_file(files, name, options_.flash_bytes * 2).value_or(Bytes{});
   }

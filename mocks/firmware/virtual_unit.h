@@ -81,13 +81,15 @@ class VirtualUnit {
   void fill_flash(nanoseconds now) { flash_full_since_ = now; }
   // From `now` on these axes repeat the reading that they have then.
   void freeze_sensor(const PerAxis<bool>& axes, nanoseconds now);
-  // Device time and calendar jump by `jump`, which may be negative.
+  // Device time and calendar jump by `jump`, which may be negative. Device time counts from 0 and is
+  // unsigned: it jumps back to 0 at most, and runs on from there.
   void jump_clock(nanoseconds jump, nanoseconds now);
   // The memory is whole, but the page's own CRC does not fit its content.
   void spoil_page();
 
   const sim::UnitTruth& truth() const { return options_.truth; }
   PageMemory& memory() { return memory_; }
+  std::uint16_t battery_mv() const { return options_.battery_mv; }
   void set_battery_mv(std::uint16_t battery_mv) { options_.battery_mv = battery_mv; }
   sim::FilterConfiguration recording_filter() const;
   // Puts a recording into the flash as if the unit had made it; configuration where it does not
@@ -120,7 +122,8 @@ class VirtualUnit {
 
   struct ClockJump {
     nanoseconds at;
-    nanoseconds by;
+    nanoseconds by;              // of the calendar
+    nanoseconds device_time_by;  // the same, but where that would be below 0
   };
 
   struct Commands;  // what it answers to each command: virtual_unit_commands.cpp
@@ -133,7 +136,8 @@ class VirtualUnit {
   void keep(Bytes image, UtcTime start);
   void load_page();
   std::uint64_t device_time_us(nanoseconds at) const;
-  nanoseconds jumped_until(nanoseconds at) const;
+  nanoseconds device_time(nanoseconds at) const;
+  nanoseconds jumped_until(nanoseconds at) const;  // the calendar
   std::uint64_t flash_left() const;
 
   VirtualUnitOptions options_;

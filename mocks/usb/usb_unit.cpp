@@ -51,7 +51,7 @@ Result<FatImage> unit_volume(const VirtualUnit& unit) {
   }
   if (images.empty()) {
     const std::string info =
-        sim::recording_info(unit.truth(), date, date, kEmptyRate_hz).serialise();
+        sim::recording_info(unit.truth(), date, date, kEmptyRate_hz, unit.battery_mv()).serialise();
     files.push_back({"info.txt", std::make_shared<const Bytes>(info.begin(), info.end()), date});
     files.push_back(
         {"log.bin",

@@ -1,5 +1,7 @@
 #include "repair/batch/requests.h"
 
+#include <cstdint>
+#include <limits>
 #include <mutex>
 #include <optional>
 
@@ -20,7 +22,7 @@ namespace {
 // Takes the values of a JSON object one by one; what is left over at the end is an error.
 class Options {
  public:
-  explicit Options(std::string_view text) : json_(Json::parse(text, nullptr, false)) {
+  explicit Options(Json json) : json_(std::move(json)) {
     if (!json_.is_object()) {
       refuse("the options are no JSON object");
     }
@@ -32,15 +34,30 @@ class Options {
       return;
     }
     const Json& given = json_[name];
-    const bool fits = std::is_same_v<Value, bool>          ? given.is_boolean()
-                      : std::is_same_v<Value, std::string> ? given.is_string()
-                                                           : given.is_number_unsigned();
-    if (fits) {
+    if constexpr (std::is_same_v<Value, unsigned>) {
+      constexpr unsigned kMost = std::numeric_limits<unsigned>::max();
+      if (given.is_number_unsigned() && given.get<std::uint64_t>() <= kMost) {
+        value = given.get<unsigned>();
+      } else {
+        refuse(fmt::format("the option {} is no whole number from 0 to {}", name, kMost));
+      }
+    } else if (std::is_same_v<Value, bool> ? given.is_boolean() : given.is_string()) {
       value = given.get<Value>();
     } else {
       refuse(fmt::format("the option {} has a value of another type", name));
     }
     json_.erase(name);
+  }
+
+  void take(const char* name, LinkKind& value) {
+    std::string text;
+    take(name, text);
+    const auto kind = parse_link_kind(text);
+    if (kind && kind != LinkKind::none) {
+      value = *kind;
+    } else if (!text.empty()) {
+      refuse(fmt::format("the option {} is neither hard nor symbolic", name));
+    }
   }
 
   Status done() {
@@ -89,14 +106,22 @@ Result<std::optional<db::Store>> store_to_read(Env& env, const std::string& loca
 }  // namespace
 
 Status take_options(std::string_view json, ScanRequest& request) {
-  Options options(json);
+  return take_parsed_options(Json::parse(json, nullptr, false), request);
+}
+
+Status take_options(std::string_view json, RepairRequest& request) {
+  return take_parsed_options(Json::parse(json, nullptr, false), request);
+}
+
+Status take_parsed_options(Json json, ScanRequest& request) {
+  Options options(std::move(json));
   options.take("jobs", request.jobs);
   options.take("store", request.store);
   return options.done();
 }
 
-Status take_options(std::string_view json, RepairRequest& request) {
-  Options options(json);
+Status take_parsed_options(Json json, RepairRequest& request) {
+  Options options(std::move(json));
   options.take("jobs", request.jobs);
   for (const auto& [name, text] : {std::pair("constants", &request.constants),
                                    {"calibration_file", &request.calibration_file},
@@ -118,6 +143,7 @@ Status take_options(std::string_view json, RepairRequest& request) {
                                    {"redo_outdated", &how.redo_outdated}}) {
     options.take(name, *flag);
   }
+  options.take("link_unaffected", request.link_unaffected);
   return options.done();
 }
 
@@ -178,6 +204,8 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   options.folder = request.folder;
   options.repair = request.repair;
   options.jobs = request.jobs;
+  options.link = request.link_unaffected;
+  options.make_link = link_file;
   const auto reports = repair_files(
       env, named, options, finder, pool,
       {{}, [&](const RepairProgress& done) { watching.watch(done.files); }, {}}, watching.stop);

@@ -18,6 +18,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/env.h"
+#include "base/link_file.h"
 #include "repair/batch/answers.h"
 
 namespace sixpoint::repair {
@@ -40,15 +41,19 @@ struct RepairRequest {
   bool or_scan = false;
   bool no_pool = false;  // do not ask the unit's other files
   RepairOptions repair;
+  LinkKind link_unaffected = LinkKind::none;  // RepairFilesOptions::link
   unsigned jobs = 0;
 };
 
 // Sets what a JSON object names: {"jobs": 2, "store": "plant.db"}, for a repair also the other
-// fields above and, of RepairOptions, wide, store_only, undo_rotation, allow_prior, salvage, force,
-// dry_run, resume and redo_outdated. usage for a name that is none of these, and for a value of
-// another type.
+// fields above (link_unaffected is "hard", "symbolic" or empty) and, of RepairOptions, wide,
+// store_only, undo_rotation, allow_prior, salvage, force, dry_run, resume and redo_outdated. usage
+// for a name that is none of these, for a value of another type, and for a number that is too large.
 Status take_options(std::string_view json, ScanRequest& request);
 Status take_options(std::string_view json, RepairRequest& request);
+// The same of an object in memory, whose texts may hold bytes that are no UTF-8, as names of files do.
+Status take_parsed_options(Json json, ScanRequest& request);
+Status take_parsed_options(Json json, RepairRequest& request);
 
 // On the calling thread `watch(done)` is called meanwhile (jobs.h); once `stop` is set, no further
 // file is begun.

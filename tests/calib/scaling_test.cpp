@@ -192,6 +192,36 @@ TEST(Rescale, EqualsWhatTheFirmwareWouldHaveStored) {
 
 // Oracle: Eq. 4-6 and the three rows of the matrix, written out; the rounding is within half a
 // count.
+// docs/repair.md, "What changes": where two integers share a stored count, their middle is taken. So
+// the new count is at most half a sensor count, and its own rounding, from what either makes.
+TEST(Rescale, TwoIntegersOfOneCountAreTakenByTheirMiddle) {
+  const auto fresh = calibration_from({{260, 305, 320}, {-250, -221, -240}, {20, 47, 30}});
+  ASSERT_OK(fresh);
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  ASSERT_OK(reversal);
+  const auto rescale = Rescale::make(*reversal, *fresh, {});
+  ASSERT_OK(rescale);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double count_per_lsb = fresh->sensitivity_g_per_lsb[a] * 256;
+    int pairs = 0;
+    for (int stored = -1500; stored <= 1500; ++stored) {
+      const RawCandidates found = reversal->candidates(a, stored);
+      if (found.number < 2) {
+        continue;
+      }
+      ++pairs;
+      ASSERT_EQ(found.number, 2);
+      const double lower = count_per_lsb * (found.first - fresh->zero_lsb[a]);
+      const double upper = lower + count_per_lsb;
+      const int made = (*rescale)(a, static_cast<std::int16_t>(stored));
+      ASSERT_NEAR(made, (lower + upper) / 2, 0.5 + 1e-9) << stored;
+      ASSERT_NEAR(made, lower, count_per_lsb / 2 + 0.5 + 1e-9) << stored;
+      ASSERT_NEAR(made, upper, count_per_lsb / 2 + 0.5 + 1e-9) << stored;
+    }
+    EXPECT_GT(pairs, 0) << "axis " << a;
+  }
+}
+
 TEST(Rescale, CrossAxisTermsAreAppliedToTheIntegersInOneRounding) {
   const StoredConstants old = affected();
   const Calibration fresh = {{1 / 240.0, 1 / 251.0, 1 / 246.0}, {50.3, 95.6, 61.4}};

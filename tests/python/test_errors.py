@@ -1,5 +1,6 @@
 """Bad input gives exceptions with code and hint; Ctrl-C ends a call."""
 
+import os
 import pathlib
 import pickle
 import random
@@ -31,6 +32,23 @@ class BadInput(InFolder):
         self.assertEqual(raised.exception.code, "no_input")
         again = pickle.loads(pickle.dumps(raised.exception))
         self.assertEqual((again.code, again.hint), (raised.exception.code, raised.exception.hint))
+
+    def test_a_name_that_is_no_utf8(self):
+        missing = os.fsencode(self.folder) + b"/no\xff.gt3x"
+        damaged = os.fsencode(self.folder) + b"/cut\xff.gt3x"
+        with open(damaged, "wb") as file:
+            file.write(b"no archive")
+        for name, kind in ((missing, sixpoint.NoInputError), (damaged, sixpoint.BadDataError)):
+            for path in (name, os.fsdecode(name)):
+                self.assert_refused(path, kind)
+                with self.assertRaises(kind) as raised:
+                    sixpoint.read(path)
+                self.assertEqual(raised.exception.where, os.fsdecode(name))
+                str(raised.exception).encode()  # can be printed
+        with self.assertRaises(sixpoint.SixpointError):
+            sixpoint.repair(simulated(), os.fsdecode(damaged), scan=True)
+        with self.assertRaises(sixpoint.NoInputError):
+            sixpoint.repair(simulated(), self.folder / "out", constants=os.fsdecode(missing))
 
     def test_no_archive_and_a_cut_one(self):
         path = self.folder / "a.gt3x"
@@ -99,6 +117,23 @@ class BadInput(InFolder):
             sixpoint.solve(path, method="guess")
         with self.assertRaises(ValueError):
             sixpoint.stream(path, rows=0)
+        for call in (
+            lambda: sixpoint.stream(path, rows=2**70),
+            lambda: sixpoint.read(path, fill_limit_s=2**70),
+            lambda: sixpoint.scan(path, jobs=2**70),
+            lambda: sixpoint.scan(path, jobs=2**32),
+            lambda: sixpoint.scan(path, jobs=-1),
+            lambda: sixpoint.solve(path, seed=2**70),
+            lambda: sixpoint.solve(path, prior="another"),
+            lambda: sixpoint.solve(path, altitude=500.0),
+            lambda: sixpoint.solve(path, gravity=1.62),
+            lambda: sixpoint.repair(path, self.folder / "out", link_unaffected="soft"),
+        ):
+            with self.assertRaises(sixpoint.UsageError):
+                call()
+        for call in (lambda: sixpoint.stream(path, rows=1.5), lambda: sixpoint.read(path, fill_limit_s=1e9)):
+            with self.assertRaises(TypeError):
+                call()
         cut = f"{path}\0b"  # must not read what stands before the zero byte
         for name, use in (
             ("read", sixpoint.read),

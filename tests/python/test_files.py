@@ -9,7 +9,7 @@ import shutil
 
 import sixpoint
 
-from made import InFolder, program_json, real, simulated
+from made import InFolder, program, program_json, real, simulated
 
 
 def without_time(document):
@@ -56,15 +56,45 @@ class SameAnswers(InFolder):
         self.assertLessEqual(fields_of(answer), set(answer.document))
         self.assertEqual(answer.verified, said["verified"])
 
+    def test_solve_by_local_gravity(self):
+        for ours, theirs in (
+            ({"gravity": 9.81}, ("--gravity", "9.81")),
+            ({"latitude": 48.1, "altitude": 520.0}, ("--latitude", "48.1", "--altitude", "520")),
+            ({"latitude": -33.9}, ("--latitude", "-33.9")),
+        ):
+            answer = sixpoint.solve(simulated(), **ours)
+            said = program_json("solve", simulated(), *theirs, expected=(0, 1))
+            self.assertNotEqual(answer.gravity_m_per_s2, 9.80665)
+            self.assertEqual(answer.gravity_m_per_s2, said["gravity_m_per_s2"])
+            self.assertEqual(answer.constants, said["constants"])
+
+    def test_repair_links_what_needs_no_repair(self):
+        sixpoint.repair(simulated(), self.folder / "first", scan=True)
+        repaired = self.folder / "first" / simulated().name
+        for kind in ("hard", "symbolic"):
+            out = self.folder / kind
+            answer = sixpoint.repair(repaired, out, scan=True, link_unaffected=kind)
+            self.assertEqual(answer.files[0].status, "already_repaired")
+            linked = pathlib.Path(answer.files[0].linked)
+            self.assertTrue(linked.samefile(repaired))
+            self.assertEqual(linked.is_symlink(), kind == "symbolic")
+
     def test_a_name_that_is_no_utf8(self):
         path = os.fsencode(self.folder) + b"/bad\xff\xfe.gt3x"
         shutil.copy(simulated(), path)
         name = os.fsdecode(path)
         self.assertEqual(sixpoint.inspect(name).serial, sixpoint.inspect(simulated()).serial)
-        self.assertEqual(sixpoint.scan([name]).files[0].verdict, "affected")
+        for paths in (name, path, [name], [path]):
+            found = sixpoint.scan(paths).files[0]
+            self.assertEqual((found.verdict, found.path), ("affected", name))
         self.assertEqual(sixpoint.solve(name).constants, sixpoint.solve(simulated()).constants)
         self.assertEqual(len(sixpoint.read(name)), len(sixpoint.read(simulated())))
         answer = sixpoint.repair(name, self.folder / "fixed", scan=True)
+        self.assertEqual(answer.files[0].status, "repaired")
+        self.assertGreater(len(sixpoint.read(answer.files[0].output)), 0)  # the name can be used
+        constants = os.fsencode(self.folder) + b"/c\xff.json"
+        program("solve", simulated(), "-o", os.fsdecode(constants), expected=(0, 1))
+        answer = sixpoint.repair(name, self.folder / "by", constants=os.fsdecode(constants))
         self.assertEqual(answer.files[0].status, "repaired")
 
     def test_repair(self):

@@ -1,6 +1,9 @@
 """read() and stream(): against files made here, the program's exports, and the vendor's."""
 
+import concurrent.futures
 import gzip
+import multiprocessing
+import pickle
 import subprocess
 import sys
 import threading
@@ -70,6 +73,22 @@ class Small(InFolder):
         del recording
         self.assertEqual(acceleration[0, 2], 1.0)
         self.assertEqual(time[0], np.datetime64(START, "s"))
+
+    def test_can_be_pickled_and_read_by_other_processes(self):
+        path = small(self.folder)
+        here = sixpoint.read(path, fill="none")
+        workers = multiprocessing.get_context("spawn")
+        with concurrent.futures.ProcessPoolExecutor(1, mp_context=workers) as pool:
+            there = pool.submit(sixpoint.read, path, fill="none").result()
+        used = pickle.dumps(here)
+        self.assertLess(len(used), here.acceleration.nbytes + 20_000)
+        path.unlink()
+        for other in (there, pickle.loads(used)):
+            np.testing.assert_array_equal(other.acceleration, here.acceleration)
+            np.testing.assert_array_equal(other.time, here.time)
+            self.assertEqual(other.gaps_unix(), here.gaps_unix())
+            self.assertEqual(other.inspection, here.inspection)
+            self.assertEqual((other.info, other.path), (here.info, str(path)))
 
     def test_streams_the_same_rows(self):
         path = small(self.folder)

@@ -134,6 +134,9 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
       {R"({"protocol": "production", "motions": []})", "/motions"},
       {R"({"protocol": "production", "unit": {"sensor": {}}})", "/unit/sensor"},
       {R"({"protocol": "quick"})", "/protocol"},
+      {R"({"motions": [{"kind": "still", "duration_s": 3, "duration_s": 4}]})",
+       "/motions/0/duration_s"},
+      {R"({"motions": [{"kind": "still"}], "motions": [{"kind": "still"}]})", "/motions"},
       {R"({"protocol": "production", "temperature": [[0, 20], [0, 21]]})", "/temperature"},
       {R"({"seating_sd_deg": 0.1, "motions": [{"kind": "still"}]})", "/seating_sd_deg"},
   };

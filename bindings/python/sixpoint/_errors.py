@@ -20,7 +20,9 @@ class SixpointError(Exception):
 
     def __init__(self, code: str, what: str, where: str = "", hint: str = "") -> None:
         text = f"{where}: {what}" if where else what
-        super().__init__(f"{text}; {hint}" if hint else text)
+        text = f"{text}; {hint}" if hint else text
+        # A name that is no UTF-8 has surrogates, which no terminal takes; the attributes keep them.
+        super().__init__(text.encode("utf-8", "backslashreplace").decode())
         self.code = code
         self.what = what
         self.where = where

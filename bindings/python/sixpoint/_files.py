@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable
 from typing import Literal, Optional
 
 from . import _core
 from ._answers import Inspection, RepairResult, ScanResult, SolveReport
-from ._paths import Path, as_bytes
+from ._errors import UsageError
+from ._paths import Path, as_bytes, whole
 
 
 def _paths(paths: Path | Iterable[Path]) -> list[bytes]:
-    if isinstance(paths, (str, os.PathLike)):
+    if isinstance(paths, (str, bytes, os.PathLike)):
         return [as_bytes(paths)]
     return [as_bytes(path) for path in paths]
 
 
-def _or_empty(path: Optional[Path]) -> str:
-    return "" if path is None else os.fsdecode(as_bytes(path))
+def _or_empty(path: Optional[Path]) -> bytes:
+    return b"" if path is None else as_bytes(path)
 
 
 def inspect(path: Path, *, salvage: bool = False) -> Inspection:
@@ -37,7 +37,7 @@ def inspect(path: Path, *, salvage: bool = False) -> Inspection:
     Inspection
         As ``sixpoint inspect --json``.
     """
-    return Inspection.from_json(json.loads(_core.inspect(as_bytes(path), salvage)))
+    return Inspection.from_json(_core.inspect(as_bytes(path), salvage))
 
 
 def scan(
@@ -60,7 +60,7 @@ def scan(
         As ``sixpoint scan --json``: an answer for each file, also for those that cannot be read.
     """
     options = {"jobs": jobs, "store": _or_empty(store)}
-    return ScanResult.from_json(json.loads(_core.scan(_paths(paths), json.dumps(options))))
+    return ScanResult.from_json(_core.scan(_paths(paths), options))
 
 
 def solve(
@@ -70,6 +70,9 @@ def solve(
     seed: Optional[int] = None,
     strict_nonzero: bool = False,
     prior: Optional[Literal["population"]] = None,
+    gravity: Optional[float] = None,
+    latitude: Optional[float] = None,
+    altitude: Optional[float] = None,
 ) -> SolveReport:
     """Find a unit's constants from the still periods of a recording.
 
@@ -85,15 +88,30 @@ def solve(
         Reject still periods in which an axis reads exactly zero, as the paper's formula says.
     prior : {"population"}, optional
         Where sides are missing, use what units of this model are like; never verified.
+    gravity : float, optional
+        Local gravity in m/s2. Neither this nor a latitude: standard gravity, and its uncertainty.
+    latitude, altitude : float, optional
+        Or where gravity is computed from: degrees, and metres above the sea (0 where not given).
 
     Returns
     -------
     SolveReport
         As ``sixpoint solve --json``. Use the constants only where ``verified`` is true.
     """
+    if prior not in (None, "population"):
+        raise UsageError("usage", f"prior={prior!r} is not known", "", "use 'population'")
+    if seed is not None:
+        seed = whole("seed", seed, 0, 2**64 - 1)
     return SolveReport.from_json(
-        json.loads(
-            _core.solve(as_bytes(path), method, seed, strict_nonzero, prior == "population")
+        _core.solve(
+            as_bytes(path),
+            method,
+            seed,
+            strict_nonzero,
+            prior == "population",
+            gravity,
+            latitude,
+            altitude,
         )
     )
 
@@ -117,6 +135,7 @@ def repair(
     dry_run: bool = False,
     resume: bool = False,
     redo_outdated: bool = False,
+    link_unaffected: Optional[Literal["hard", "symbolic"]] = None,
     jobs: int = 0,
 ) -> RepairResult:
     """Repair affected files into another folder; the originals are never changed.
@@ -150,6 +169,8 @@ def repair(
         Compute everything, write nothing.
     resume, redo_outdated : bool
         Go on with an earlier run; replace outputs that would be made otherwise now.
+    link_unaffected : {"hard", "symbolic"}, optional
+        Links of the files that need no repair, so that the output folder holds the whole study.
     jobs : int
         Files at a time; 0: one for each core.
 
@@ -174,7 +195,7 @@ def repair(
         "dry_run": dry_run,
         "resume": resume,
         "redo_outdated": redo_outdated,
+        "link_unaffected": link_unaffected or "",
         "jobs": jobs,
     }
-    answer = _core.repair(_paths(paths), as_bytes(output), json.dumps(options))
-    return RepairResult.from_json(json.loads(answer))
+    return RepairResult.from_json(_core.repair(_paths(paths), as_bytes(output), options))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ import numpy as np
 from . import _core
 from ._answers import Clock, Constants, Gap, Inspection
 from ._errors import UsageError
-from ._paths import Path, as_bytes
+from ._paths import Path, as_bytes, whole
 
 if TYPE_CHECKING:
     import pandas
@@ -23,6 +22,7 @@ Unit = Literal["g", "lsb"]
 Fill = Literal["vendor", "none"]
 
 _USUAL_FILL_LIMIT_S = 3600
+_MOST = 2**32  # seconds: times of a recording have 32 bits; rows of a block
 
 
 def _open(
@@ -35,8 +35,7 @@ def _open(
     ):
         if value not in known:
             raise UsageError("usage", f"{name}={value!r} is not known", "", f"use one of {known}")
-    if fill_limit_s < 0:
-        raise UsageError("usage", f"fill_limit_s={fill_limit_s} is below 0", "", "give seconds")
+    fill_limit_s = whole("fill_limit_s", fill_limit_s, 0, _MOST)
     return _core.Reading(as_bytes(path), unit, dtype, fill == "vendor", fill_limit_s, salvage)
 
 
@@ -74,7 +73,10 @@ class Recording:
     sample_rate_hz: float
     info: dict[str, str]
     inspection: Inspection
-    _reading: _core.Reading = field(repr=False)
+    # What times are made from: arrays and numbers, so that a recording can be pickled.
+    _runs: NDArray[np.int64] = field(repr=False)
+    _rate_hz: int = field(repr=False)
+    _gaps_unix: list[tuple[int, int, str]] = field(repr=False)
     _time: NDArray[np.datetime64] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
@@ -88,7 +90,7 @@ class Recording:
         first use (8 bytes for each sample).
         """
         if self._time is None:
-            times = self._reading.times_ns(0, len(self.acceleration))
+            times = _core.times_of_runs(self._runs, self._rate_hz, len(self.acceleration))
             self._time = times.view("datetime64[ns]")
         return self._time
 
@@ -119,7 +121,7 @@ class Recording:
 
     def gaps_unix(self) -> list[tuple[int, int, str]]:
         """Return `gaps` as (first missing second, seconds, kind), in Unix time as the file has it."""
-        return self._reading.gaps()
+        return self._gaps_unix
 
     @property
     def damage(self) -> dict[str, Any]:
@@ -190,16 +192,18 @@ def read(
     """
     reading = _open(path, unit, fill, dtype, fill_limit_s, salvage)
     acceleration = reading.read_all()
-    inspection = Inspection.from_json(json.loads(reading.facts()))
+    inspection = Inspection.from_json(reading.facts())
     return Recording(
-        path=os.fspath(path),
+        path=os.fsdecode(path),
         unit=unit,
         fill=fill,
         acceleration=acceleration,
         sample_rate_hz=float(inspection.sample_rate_hz or 0.0),
         info={_text(key): _text(value) for key, value in reading.info()},
         inspection=inspection,
-        _reading=reading,
+        _runs=reading.runs(),
+        _rate_hz=reading.rate_hz(),
+        _gaps_unix=reading.gaps(),
     )
 
 
@@ -248,8 +252,7 @@ def stream(
     ------
     Block
     """
-    if rows < 1:
-        raise UsageError("usage", f"rows={rows} is less than 1", "", "ask for at least one row")
+    rows = whole("rows", rows, 1, _MOST)
     reading = _open(path, unit, fill, dtype, fill_limit_s, salvage)
     return _blocks(reading, rows)
 

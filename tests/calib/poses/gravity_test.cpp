@@ -28,6 +28,17 @@ TEST(Gravity, Height) {
   EXPECT_NEAR(potsdam->m_per_s2, 9.8126019, 3 * potsdam->standard_uncertainty_m_per_s2);
 }
 
+// The table of gravity.h.
+TEST(Gravity, WhatIsGivenSaysWhatItIs) {
+  EXPECT_FALSE(local_gravity({}).value()) << "gravity is unknown";
+  EXPECT_EQ(local_gravity({9.81, 90.0, 500}).value()->m_per_s2, 9.81) << "what was measured first";
+  EXPECT_EQ(local_gravity({{}, 48.0, 500}).value()->m_per_s2, gravity_at(48, 500)->m_per_s2);
+  EXPECT_EQ(local_gravity({{}, 48.0, {}}).value()->m_per_s2, gravity_at(48, 0)->m_per_s2);
+  EXPECT_FAILS(local_gravity({{}, {}, 500}), ErrorCode::usage);
+  EXPECT_FAILS(local_gravity({9.0, 48.0, 0}), ErrorCode::usage);
+  EXPECT_FAILS(local_gravity({{}, 91.0, 0}), ErrorCode::usage);
+}
+
 TEST(Gravity, Nonsense) {
   EXPECT_FAILS(gravity_at(91, 0), ErrorCode::usage);
   EXPECT_FAILS(gravity_at(std::numeric_limits<double>::quiet_NaN(), 0), ErrorCode::usage);

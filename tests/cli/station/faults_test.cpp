@@ -136,6 +136,9 @@ const std::vector<Row>& jig_rows() {
       Row{"bad_page_written", R"({"fault": "bad_page", "at_s": 0})", 0, "were unreadable", true},
       Row{"clock_jump", R"({"fault": "clock_jump", "at_s": 33, "seconds": -5})", 0,
           "clock jumped by -5.000 s"},
+      // An hour back from some 40 s: device time begins again at 0, once.
+      Row{"clock_jump_to_zero", R"({"fault": "clock_jump", "at_s": 40, "seconds": -3600})", 0,
+          "s in mid-run (1 times)"},
       Row{"power_loss", R"({"fault": "power_loss", "at_s": 1, "bytes": 300, "seconds": 2})", 0,
           "it is back", true},
       Row{"power_loss_for_good",

@@ -71,7 +71,10 @@ TEST(Session, AnArchiveThatContradictsItselfIsRefusedByName) {
   const std::string lines =
       "{\"t_ns\":5,\"kind\":\"reopened\"}\n\n{\"t_ns\":7,\"kind\":\"reopened\"}\n";
   const std::string back = "{\"t_ns\":5,\"kind\":\"reopened\"}\n{\"t_ns\":4,\"kind\":\"reopened\"}";
-  const std::string schema = R"("schema":"sixpoint/session/1")";
+  const auto schema_of = [](const std::string& transfers) {
+    return R"("schema":"sixpoint/session/1","transfers":)" + transfers;
+  };
+  const std::string schema = schema_of("2");
   const std::string started = R"(,"started":"2020-09-13T12:26:40Z")";
   const auto hash = [](const std::string& text) {
     return R"(,"sha256":")" + to_hex(sha256(as_bytes(text))) + "\"";
@@ -96,6 +99,8 @@ TEST(Session, AnArchiveThatContradictsItselfIsRefusedByName) {
     std::optional<std::string> transfers;
     const char* what;
   };
+  const char* const twice = "session.json has the key /schema twice";
+  const char* const count = "session.json does not say that there are 2 transfers";
   const std::string version = "no session of a version that this program reads";
   const std::vector<Row> rows = {
       {"no JSON", lines, version.c_str()},
@@ -107,6 +112,12 @@ TEST(Session, AnArchiveThatContradictsItselfIsRefusedByName) {
       {"{" + schema + started + hash(lines) + "}", std::nullopt, "holds no transfers.jsonl"},
       {"{" + schema + started + "}", lines, "was changed after it was recorded"},
       {"{" + schema + started + hash(lines) + "}", back, "was changed after it was recorded"},
+      {"{" + schema + started + hash(lines) + "," + schema_of("2") + "}", lines, twice},
+      {"{" + schema_of("-1") + started + hash(lines) + "}", lines, count},
+      {"{" + schema_of("3") + started + hash(lines) + "}", lines, count},
+      {"{" + schema_of("2.0") + started + hash(lines) + "}", lines, count},
+      {"{" + schema_of("\"2\"") + started + hash(lines) + "}", lines, count},
+      {R"({"schema":"sixpoint/session/1")" + started + hash(lines) + "}", lines, count},
       {"{" + schema + started + hash(back) + "}", back, "time goes back"},
   };
   for (const Row& row : rows) {

@@ -73,6 +73,22 @@ TEST(FaultPlan, AWrongPlanNamesThePath) {
   }
 }
 
+// A parser would keep the last of the two, without a word about the other.
+TEST(FaultPlan, AKeyThatStandsTwiceIsRefused) {
+  const std::vector<std::pair<std::string, std::string>> rows = {
+      {R"({"schema": "sixpoint/faults/1", "faults": [{"fault": "lost", "at_s": 1}], "faults": []})",
+       "fault plan: /faults"},
+      {plan(R"({"fault": "reset", "at_s": 1}, {"fault": "lost", "at_s": 1, "at_s": 2})"),
+       "fault plan: /faults/1/at_s"},
+  };
+  for (const auto& [text, where] : rows) {
+    const auto read = parse_fault_plan(text);
+    EXPECT_FAILS(read, ErrorCode::configuration);
+    EXPECT_EQ(read.error().where, where);
+    EXPECT_THAT(read.error().what, HasSubstr("twice"));
+  }
+}
+
 TEST(FaultPlan, AFileIsNamedInItsErrors) {
   MemoryFiles files;
   EXPECT_FAILS(read_fault_plan(files, "F.json"), ErrorCode::no_input);

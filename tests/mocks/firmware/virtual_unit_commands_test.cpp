@@ -321,5 +321,35 @@ TEST(VirtualUnitCommands, TheClockIsSetByTheRecording) {
   EXPECT_EQ(download.payload, Bytes(list.payload.begin() + 4, list.payload.begin() + 12));
 }
 
+// "GET_TIME: u64 device_time_us, u32 unix_time", from the first byte of lowest weight.
+std::pair<std::uint64_t, std::uint32_t> time_of(Asked& asked) {
+  const Reply time = asked.ask(kGetTime);
+  EXPECT_EQ(time.payload.size(), 12U);
+  std::uint64_t device_time_us = 0;
+  std::uint32_t unix_time_s = 0;
+  for (std::size_t i = 0; i < time.payload.size(); ++i) {
+    const std::uint64_t byte = time.payload[i];
+    device_time_us |= i < 8 ? byte << 8 * i : 0;
+    unix_time_s |= i < 8 ? 0 : static_cast<std::uint32_t>(byte << 8 * (i - 8));
+  }
+  return {device_time_us, unix_time_s};
+}
+
+// Device time is unsigned. Back by an hour after 40 s it is 0, and runs on from there; the calendar
+// goes back by the whole hour.
+TEST(VirtualUnitCommands, AClockThatJumpsBackBelowZeroRunsOnFromZero) {
+  Asked asked;
+  asked.now = std::chrono::seconds(40);
+  const std::uint32_t before_s = time_of(asked).second;
+  asked.unit.jump_clock(-std::chrono::hours(1), asked.now);
+  EXPECT_EQ(time_of(asked), std::pair(std::uint64_t{0}, before_s - 3600));
+  asked.now += std::chrono::milliseconds(2500);
+  EXPECT_EQ(time_of(asked), std::pair(std::uint64_t{2'500'000}, before_s - 3598));
+  asked.unit.jump_clock(std::chrono::seconds(10), asked.now);
+  EXPECT_EQ(time_of(asked).first, 12'500'000U) << "forth as far as it says";
+  asked.unit.jump_clock(-std::chrono::seconds(4), asked.now);
+  EXPECT_EQ(time_of(asked).first, 8'500'000U) << "back as far as it says";
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks

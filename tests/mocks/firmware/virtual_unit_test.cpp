@@ -1,6 +1,7 @@
 #include "mocks/firmware/virtual_unit.h"
 
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -95,6 +96,23 @@ TEST(VirtualUnit, RecordsUnderTheFirmwaresOwnFilter) {
       // this size does not average out; the rest is noise and seating.
       EXPECT_NEAR(sum[axis] / count, stored, 0.6) << firmware << " axis " << axis;
     }
+  }
+}
+
+// docs/virtual.md, battery_mv: in V, as real files have it.
+TEST(VirtualUnit, ARecordingNamesTheBatteryOfTheUnit) {
+  for (const auto& [battery_mv, battery_v] : {std::pair<std::uint16_t, double>{3400, 3.40},
+                                              std::pair<std::uint16_t, double>{4100, 4.10}}) {
+    Bench bench;
+    bench.plugged->unit.set_battery_mv(battery_mv);
+    ASSERT_OK(bench.unit->start_recording(30, from_unix_seconds(1'428'588'240)));
+    bench.clock->sleep(std::chrono::seconds(3));
+    ASSERT_OK(bench.unit->stop_recording());
+    MemoryFiles files;
+    ASSERT_OK(bench.unit->download(bench.unit->recordings()->front(), files, "x.gt3x"));
+    const auto recording = gt3x::Recording::open(files, "x.gt3x");
+    ASSERT_OK(recording);
+    EXPECT_EQ(recording->info().battery_v(), battery_v);
   }
 }
 

@@ -21,10 +21,17 @@ TEST(Requests, TakeTheirOptionsAndNoOthers) {
   EXPECT_EQ(request.jobs, 3U);
   EXPECT_EQ(request.constants, "C.json");
   EXPECT_FALSE(request.or_scan);
-  for (const char* wrong : {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", "[]", "{"}) {
+  for (const char* wrong :
+       {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})",
+        R"({"jobs": 1.5})", R"({"link_unaffected": "none"})", R"({"link_unaffected": 1})", "[]",
+        "{"}) {
     RepairRequest other;
     EXPECT_FAILS(take_options(wrong, other), ErrorCode::usage);
   }
+  ASSERT_OK(take_options(R"({"link_unaffected": "symbolic"})", request));
+  EXPECT_EQ(request.link_unaffected, LinkKind::symbolic);
+  ASSERT_OK(take_parsed_options({{"constants", "\xff.json"}, {"link_unaffected", ""}}, request));
+  EXPECT_EQ(request.constants, "\xff.json") << "a name that is no UTF-8";
   ScanRequest scan;
   EXPECT_FAILS(take_options(R"({"wide": true})", scan), ErrorCode::usage);
 }

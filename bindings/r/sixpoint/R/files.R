@@ -19,13 +19,14 @@ repair_16cpan03 <- function(paths, output, constants = "", calibration_file = ""
                             store_only = FALSE,
                             undo_rotation = FALSE, allow_prior = FALSE, salvage = FALSE,
                             force = FALSE, dry_run = FALSE, resume = FALSE,
-                            redo_outdated = FALSE, jobs = 0L) {
+                            redo_outdated = FALSE, link_unaffected = "", jobs = 0L) {
   options <- options_json(
     constants = constants, calibration_file = calibration_file, scan = scan, store = store,
     or_scan = or_scan, no_pool = no_pool, wide = wide, store_only = store_only,
     undo_rotation = undo_rotation,
     allow_prior = allow_prior, salvage = salvage, force = force, dry_run = dry_run,
-    resume = resume, redo_outdated = redo_outdated, jobs = as.integer(jobs)
+    resume = resume, redo_outdated = redo_outdated, link_unaffected = link_unaffected,
+    jobs = as.integer(jobs)
   )
   document <- jsonlite::fromJSON(
     answer_of(.Call(C_repair_json, enc2native(paths), enc2native(output), options)),
@@ -35,7 +36,7 @@ repair_16cpan03 <- function(paths, output, constants = "", calibration_file = ""
   text <- function(key) vapply(files, function(file) null_to_na(file[[key]], NA_character_), "")
   number <- function(value) as.numeric(null_to_na(value, NA))
   frame <- data.frame(
-    input = text("input"), output = text("output"), status = text("status"), method = text("method"),
+    input = text("input"), output = text("output"), linked = text("linked"), status = text("status"), method = text("method"),
     serial = text("serial"), samples = vapply(files, function(file) number(file$samples), 0),
     clipped_before = vapply(files, function(file) number(file$clipped_before), 0),
     clipped_after = vapply(files, function(file) number(file$clipped_after), 0),
