@@ -9,8 +9,6 @@
 namespace sixpoint::repair {
 namespace {
 
-using calib::FilterConfiguration;
-
 std::string joined(const std::vector<std::string>& parts) {
   return fmt::format("{}", fmt::join(parts, "; "));
 }
