@@ -422,6 +422,14 @@ def settings(suite):
     other = {"positive_lsb": [300, 301, 302], "negative_lsb": [-300, -301, -302], "zero_lsb": [1, 2, 3]}
     suite.put("P6", "repeated before the first sample: the last holds",
               archive(parameters() + parameters(constants=other) + second(0)), constants=other, **one)
+    whole = parameters()[8:-1]
+    for key, name, none in (((1, 16), "zero of y", "constants"), ((0, 9), "time of calibration", "calibration_time")):
+        again = struct.pack("<HHI", *key, 99)
+        for payload, where in ((whole + again, "behind"), (again + whole, "before")):
+            suite.put("P7", f"another {name} {where} it in one record: neither is used",
+                      archive(record(PARAMETERS, START - 1, payload) + second(0)), **{none: None}, **one)
+    suite.put("P7", "an entry that stands twice with one value", archive(record(PARAMETERS, START - 1, whole + whole) + second(0)),
+              constants=CONSTANTS, **one)
     facts = dict(serial="MOS2A45130450", sample_rate_hz=30, **one)
     suite.put("I1", "line ends without carriage return", archive(second(0), info(end="\n")), **facts)
     suite.put("I1", "a byte-order mark", archive(second(0), b"\xef\xbb\xbf" + info()), **facts)
