@@ -49,6 +49,12 @@ void Context::worsen(int code) {
 
 void Context::worsen_as_incomplete() { exit_code = std::max(exit_code, kExitInconclusive); }
 
+void take_stop(Context& context, int signal) {
+  if (signal == SIGINT || signal == SIGHUP) {
+    context.worsen(kExitStopped);
+  }
+}
+
 Json document(std::string_view command) {
   Json json;
   json["schema"] = fmt::format("sixpoint/{}/1", command);

@@ -77,6 +77,10 @@ struct Context {
   void worsen_as_incomplete();
 };
 
+// The exit code of a command that a signal ended (stop_request.h): 3, as everywhere; 0 by SIGTERM, the word
+// of what supervises services. `signal` may be none (-1): the command ended by itself.
+void take_stop(Context& context, int signal);
+
 // {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.
 Json document(std::string_view command);
 

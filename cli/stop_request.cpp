@@ -4,8 +4,6 @@
 
 #include <pthread.h>
 
-#include "cli/context.h"
-
 namespace sixpoint::cli {
 
 namespace {
@@ -28,12 +26,6 @@ sigset_t block_stop_signals(sigset_t* before) {
   add_unless_ignored(SIGHUP, signals);
   pthread_sigmask(SIG_BLOCK, &signals, before);
   return signals;
-}
-
-void take_stop(Context& context, int signal) {
-  if (signal == SIGINT || signal == SIGHUP) {
-    context.worsen(kExitStopped);
-  }
 }
 
 StopRequest::StopRequest() : signals_(block_stop_signals(&before_)) {

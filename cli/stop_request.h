@@ -9,22 +9,16 @@
 //   context.worsen(kExitStopped);
 //
 // A command that runs until it is told to end waits for one of block_stop_signals(), then calls
-// take_stop().
+// take_stop() (context.h).
 #pragma once
 
 #include <csignal>
 
 namespace sixpoint::cli {
 
-struct Context;
-
 // From here on they wait for sigwait() or sigtimedwait() with the set that is returned. New threads
 // inherit that. `before`: where the mask that was in force goes.
 sigset_t block_stop_signals(sigset_t* before = nullptr);
-
-// The exit code of a command that was ended so: 3, as everywhere; 0 by SIGTERM, the word of what
-// supervises services. `signal` may be none (-1): the command ended by itself.
-void take_stop(Context& context, int signal);
 
 // One at a time, on the thread that made it. The signals behave as before after it. A reader of the
 // output that goes away (SIGPIPE) asks for an end, too, where that thread writes.

@@ -68,20 +68,27 @@ std::string why_of(const Candidate& best, const std::vector<Candidate>& all,
                               best.uncertainty_mg);
 }
 
+// By how much two sets disagree; nothing where they agree or cannot be compared.
+std::optional<calib::Agreement> disagreement(const Candidate& one, const Candidate& other) {
+  if (!one.record || !other.record) {
+    return std::nullopt;
+  }
+  const auto between = calib::agreement(one.record->calibration, one.record->uncertainty,
+                                        other.record->calibration, other.record->uncertainty);
+  return between.agree() ? std::nullopt : std::optional(between);
+}
+
 // The first newer set of a method behind that disagrees; what is wrong, in one sentence.
 std::optional<std::string> conflict_with(const Candidate& best, const std::vector<Candidate>& all) {
   for (const Candidate& other : all) {
-    if (other.kind <= best.kind || other.row->made_at <= best.row->made_at || !other.record ||
-        !best.record) {
+    if (other.kind <= best.kind || other.row->made_at <= best.row->made_at) {
       continue;
     }
-    const auto between = calib::agreement(best.record->calibration, best.record->uncertainty,
-                                          other.record->calibration, other.record->uncertainty);
-    if (!between.agree()) {
+    if (const auto between = disagreement(best, other)) {
       return fmt::format(
           "the set {} by {} is older than the set {} by {} and disagrees with it ({}): decide with "
           "'sixpoint store prefer ID --why TEXT'",
-          best.row->id, best.method(), other.row->id, other.method(), between.brief());
+          best.row->id, best.method(), other.row->id, other.method(), between->brief());
     }
   }
   return std::nullopt;
@@ -91,18 +98,13 @@ std::optional<std::string> conflict_with(const Candidate& best, const std::vecto
 std::string doubt_about(const Candidate& best, const std::vector<Candidate>& same_method) {
   constexpr std::size_t kDate = 10;
   for (const Candidate& other : same_method) {
-    if (!other.record || !best.record) {
-      continue;
-    }
-    const auto between = calib::agreement(best.record->calibration, best.record->uncertainty,
-                                          other.record->calibration, other.record->uncertainty);
-    if (!between.agree()) {
+    if (const auto between = disagreement(best, other)) {
       return fmt::format(
           "the store's set {} of {} disagrees with this one, {} ({}): one of them may be of "
-          "another unit, or the "
-          "sensor has changed; 'sixpoint store prefer ID --why TEXT' or 'store withdraw' decides",
+          "another unit, or the sensor has changed; 'sixpoint store prefer ID --why TEXT' or "
+          "'store withdraw' decides",
           db::shown_id(other.row->id), to_iso8601(other.row->made_at).substr(0, kDate),
-          db::shown_id(best.row->id), between.brief());
+          db::shown_id(best.row->id), between->brief());
     }
   }
   return {};
