@@ -98,10 +98,10 @@ class StationStore {
     auto store = open_store(context_, options_.store);
     return guard_.may_start(store, serial, options_.station);
   }
-  Status may_write(const std::string& serial, const std::string& constants_id) {
+  Status may_write(const station::WaitingConstants& waiting) {
     const std::lock_guard lock(mutex_);
-    SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
-    return station::may_write(store, serial, constants_id);
+    auto store = open_existing_store(context_, options_.store);
+    return station::may_write(store, waiting.serial, waiting.id, waiting.are_kept_here);
   }
   Result<station::RunInStore> add_run(const station::JigReport& measured,
                                       const station::RunLabels& labels);
@@ -158,7 +158,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
       session_, measured.serial, labels.jig_id.empty() ? measured.jig : labels.jig_id);
   run.jig_due = jig_due_.due;
   station::JigReport report = measured;
-  if (std::string note = station::jig_due_note(jig_due_, measured.started); !note.empty()) {
+  if (std::string note = station::jig_due_note(jig_due_, measured.ended); !note.empty()) {
     report.reasons.push_back(std::move(note));
   }
   run.kind = labels.kind;
@@ -400,8 +400,8 @@ Status serve(const StationCommandOptions& options, Context& context) {
   station::QualityControl quality(open, options.station, lanes_asked.session.limits,
                                   context.env.clock);
   lanes_asked.may_start = [&](const std::string& serial) { return store.may_start(serial); };
-  lanes_asked.may_write = [&](const std::string& serial, const std::string& constants_id) {
-    return store.may_write(serial, constants_id);
+  lanes_asked.may_write = [&](const station::WaitingConstants& waiting) {
+    return store.may_write(waiting);
   };
   const station::StoreConstants store_constants = [&](const station::CaptureReport& report) {
     return store.add_constants(report);

@@ -160,13 +160,14 @@ class Lanes::Lane {
   // "Write now": the last run goes on with its write (StartOrder::last_run).
   void write_last(const std::stop_token& stop, const StartOrder& order);
   UnfinishedRun new_run(const StartOrder& order, calib::FilterConfiguration filter);
-  Result<RetestState> check_start(const std::string& serial, bool is_continued);
+  Result<RetestState> check_start(const std::string& serial);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
   void on_action(const JigAction& action);
-  Status check_write(const std::string& serial);
+  Status check_write();
   void end_without_report(const std::string& serial, const Error& error);
   void end_unmeasured(const std::string& serial, const char* verdict,
                       std::vector<std::string> reasons, std::string message);
+  void end_refused(const std::string& serial, const Error& error);
   void continue_run(const std::stop_token& stop, const UnfinishedRun& left);
   void end_interrupted(const UnfinishedRun& left, const std::string& reason, ErrorCode code);
   // The verdict is shown at once; store_result() follows.
@@ -239,7 +240,7 @@ class Lanes::Lane {
   std::optional<Unstored> unstored_;
   // The last run, where it passed and nothing was written, for write_last().
   std::optional<UnfinishedRun> unwritten_;
-  std::string unwritten_id_;  // its constants in the store; empty as long as the store has none
+  WaitingConstants waiting_;  // its constants; without an id as long as there is no record of them
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;

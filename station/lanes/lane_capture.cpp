@@ -135,9 +135,11 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
     capture_ = CaptureView{};
     changed();
   }
-  if (const auto allowed = check_start(state.serial, left.has_value()); !allowed) {
-    return end_capture(
-        result_of(state.serial, "refused", {allowed.error().what, allowed.error().hint}));
+  if (!left) {  // the unit of one that goes on records already
+    if (const auto allowed = check_start(state.serial); !allowed) {
+      return end_capture(
+          result_of(state.serial, "refused", {allowed.error().what, allowed.error().hint}));
+    }
   }
   const auto report = run_capture(on_jig(), env_, options, capture_hooks(stop, state),
                                   left ? std::optional(left->resume) : std::nullopt);

@@ -56,6 +56,7 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   report.serial = left.serial;
   report.firmware = left.firmware;
   report.filter = left.filter;
+  report.jig = left.jig;
   report.started = resume.started;
   report.ended = ended;
   report.gravity = options.gravity;
@@ -87,10 +88,17 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                  });
   const UnfinishedRun& state = saver.state();
   session.filter = state.filter;
-  const auto allowed = check_start(state.serial, left.has_value() && !order.last_run);
+  const auto allowed = check_start(state.serial);
+  if (!allowed && left && !order.last_run) {
+    return end_interrupted(*left, "interrupted: " + allowed.error().brief(), allowed.error().code);
+  }
   if (!allowed) {
-    return end_unmeasured(state.serial, "refused", {allowed.error().what, allowed.error().hint},
-                          allowed.error().brief());
+    return end_refused(state.serial, allowed.error());
+  }
+  if (order.last_run) {
+    unwritten_.reset();
+    // For a program that goes on with it: the store has this run's samples, and their file is gone.
+    static_cast<void>(folder_.append(left->resume.raw_csv));
   }
   // "Write now" is no second run: what its readings had to show, they had to show when they were
   // taken.
@@ -131,7 +139,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
-    unwritten_id_.clear();
+    waiting_ = {state.serial};
     last.resume = {run_->progress, report->started, report->as_found, {},
                    false,          report->stream,  report->raw_csv};
     unwritten_serial_ = state.serial;
@@ -146,10 +154,13 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
 }
 
 void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& order) {
-  UnfinishedRun left = *std::exchange(unwritten_, std::nullopt);
-  if (const Status good = check_write(left.serial); !good) {
-    return end_unmeasured(left.serial, "refused", {good.error().what, good.error().hint},
-                          good.error().brief());
+  UnfinishedRun left = *unwritten_;
+  if (const Status good = check_write(); !good) {
+    const ErrorCode code = good.error().code;
+    if (code == ErrorCode::configuration || code == ErrorCode::no_input) {
+      unwritten_.reset();  // withdrawn, or not in the store: so it stays
+    }
+    return end_refused(left.serial, good.error());
   }
   left.operator_name = both_names(left.operator_name, order.operator_name);
   left.is_authenticated = left.is_authenticated && order.is_authenticated;
@@ -163,8 +174,6 @@ void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& orde
     write_ = true;
     run_.emplace().progress = left.resume.progress;
   }
-  // For a program that goes on with it: the store has this run's samples, and their file is gone.
-  static_cast<void>(folder_.append(left.resume.raw_csv));
   run(stop, writing, left);
 }
 
@@ -179,30 +188,29 @@ UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfigu
   run.client = order.client;
   run.write = order.write;
   run.filter = filter;
+  run.jig = unit_ ? on_jig().jig->name() : std::string();
   run.jig_id = shared_.options.jig_id;
   run.gravity_m_per_s2 = shared_.options.session.gravity.m_per_s2;
   return run;
 }
 
-// An error where the constants that wait were withdrawn, or the store cannot say so. What only the
-// journal has, nobody can have withdrawn.
-Status Lanes::Lane::check_write(const std::string& serial) {
-  if (!shared_.options.may_write || unwritten_id_.empty()) {
+// An error where the constants that wait were withdrawn, or the store cannot say so.
+Status Lanes::Lane::check_write() {
+  if (!shared_.options.may_write || waiting_.id.empty()) {
     return {};
   }
   const std::lock_guard lock(shared_.store_mutex);
-  return shared_.options.may_write(serial, unwritten_id_);
+  return shared_.options.may_write(waiting_);
 }
 
-// An error where the station is locked or the unit failed too often: an engineer decides. A run
-// that is continued was checked when it started.
-Result<RetestState> Lanes::Lane::check_start(const std::string& serial, bool is_continued) {
+// An error where the station is locked, its jig is overdue or the unit failed too often: an engineer
+// decides. Asked again when a run goes on: the program may have been away for days.
+Result<RetestState> Lanes::Lane::check_start(const std::string& serial) {
   if (!shared_.options.may_start) {
     return RetestState{};
   }
   const std::lock_guard lock(shared_.store_mutex);
-  auto found = shared_.options.may_start(serial);
-  return found || !is_continued ? std::move(found) : RetestState{};
+  return shared_.options.may_start(serial);
 }
 
 JigHooks Lanes::Lane::run_hooks(const std::stop_token& stop, RunSaver& saver) {
@@ -288,6 +296,16 @@ void Lanes::Lane::end_unmeasured(const std::string& serial, const char* verdict,
            std::move(message));
 }
 
+// Constants that wait, wait on: what the refusal is about may be put right.
+void Lanes::Lane::end_refused(const std::string& serial, const Error& error) {
+  end_unmeasured(serial, "refused", {error.what, error.hint}, error.brief());
+  const std::lock_guard lock(mutex_);
+  if (unwritten_ && unwritten_->serial == serial) {
+    unwritten_serial_ = serial;
+    result_["can_write"] = true;
+  }
+}
+
 void Lanes::Lane::show_result(const JigReport& report, const RunLabels& labels) {
   unstored_ = Unstored{report, labels};
   const std::lock_guard lock(mutex_);
@@ -352,8 +370,9 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
             stored->ids.constants_id ? Json(*stored->ids.constants_id) : Json(nullptr);
         result_.erase("problem");
       }
-      if (unwritten_ && !stored->is_kept_here && unstored_->labels.kind != kWriteKind) {
-        unwritten_id_ = stored->ids.constants_id.value_or("");
+      if (unwritten_ && unstored_->labels.kind != kWriteKind) {
+        waiting_.id = stored->ids.constants_id.value_or("");
+        waiting_.are_kept_here = stored->is_kept_here;
       }
       unstored_.reset();
       is_unstored_ = false;

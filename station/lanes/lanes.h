@@ -62,10 +62,15 @@ using StoreRun = std::function<Result<RunInStore>(const JigReport&, const RunLab
 // Before a run or a capture: may this unit be measured now, and what do its earlier runs demand? On
 // an error nothing is measured, and the operator reads why. May be empty.
 using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
-// Before the constants of a stored run are written: are they still good? On an error nothing is
-// written, and the operator reads why. May be empty.
-using WriteCheck =
-    std::function<Status(const std::string& serial, const std::string& constants_id)>;
+// Constants of a run that passed and was not written.
+struct WaitingConstants {
+  std::string serial;
+  std::string id;
+  bool are_kept_here = false;  // as RunInStore::is_kept_here
+};
+// Before they are written: are they still good? On an error nothing is written, and the operator
+// reads why. May be empty.
+using WriteCheck = std::function<Status(const WaitingConstants&)>;
 // Stores the constants of a calibration file; answers with their id in the store.
 using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;
 

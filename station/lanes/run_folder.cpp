@@ -92,6 +92,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.as_found, parse_page(json.at("as_found")));
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   // Folders of earlier versions do not have these.
+  run.jig = json.value("jig", run.jig);
   SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
   if (json.contains("jig_id") && !json["jig_id"].is_null()) {
     run.jig_id = json["jig_id"].get<std::string>();
@@ -203,6 +204,8 @@ Result<std::optional<UnfinishedRun>> RunFolder::load() {
 Status RunFolder::save(const UnfinishedRun& run) {
   if (file_) {
     SIXPOINT_CHECK(file_->sync());  // the rows that the state is about come first
+  } else {
+    SIXPOINT_CHECK(remove_samples_of_no_run());
   }
   const Json json = {
       {"schema", "sixpoint/unfinished-run/1"},
@@ -220,6 +223,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
       {"rows_sha256", run.rows_sha256},
       {"filter", calib::to_string(run.filter)},
       {"protocol", to_string(run.protocol)},
+      {"jig", run.jig},
       {"jig_id", run.jig_id ? Json(*run.jig_id) : Json(nullptr)},
       {"gravity_m_per_s2", run.gravity_m_per_s2 ? Json(*run.gravity_m_per_s2) : Json(nullptr)},
       {"started", to_iso8601(run.resume.started)},
@@ -234,6 +238,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
 Status RunFolder::append(std::string_view rows) {
   if (!file_) {
     SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
+    SIXPOINT_CHECK(remove_samples_of_no_run());
     SIXPOINT_ASSIGN(const auto names, sample_files());
     const int next = names.empty() ? 1 : number_of(names.back()) + 1;
     SIXPOINT_ASSIGN(file_, env_.files.create(fmt::format("{}/{}{}.csv", folder_, kSamples, next)));
@@ -268,11 +273,19 @@ Status RunFolder::clear() {
   if (env_.files.info(folder_ + kRun)) {
     SIXPOINT_CHECK(env_.files.remove(folder_ + kRun));
   }
+  SIXPOINT_CHECK(remove_samples_of_no_run());
+  return env_.files.sync_folder(folder_);
+}
+
+Status RunFolder::remove_samples_of_no_run() {
+  if (env_.files.info(folder_ + kRun)) {
+    return {};
+  }
   SIXPOINT_ASSIGN(const auto names, sample_files());
   for (const std::string& name : names) {
     SIXPOINT_CHECK(env_.files.remove(folder_ + "/" + name));
   }
-  return env_.files.sync_folder(folder_);
+  return {};
 }
 
 Result<std::optional<UnfinishedCapture>> RunFolder::load_capture() {

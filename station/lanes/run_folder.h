@@ -37,6 +37,7 @@ struct UnfinishedRun {
   std::string kind = "jig";  // or kWriteKind (run_records.h)
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
+  std::string jig = {};  // JigReport::jig; empty in folders of earlier versions
   // Where it is measured; nothing in folders of earlier versions.
   std::optional<std::string> jig_id = {};
   std::optional<double> gravity_m_per_s2 = {};
@@ -85,6 +86,9 @@ class RunFolder {
  private:
   Result<std::vector<std::string>> sample_files() const;  // names, oldest first
   Status set_aside(const std::vector<std::string>& names);
+  // Before the first rows and the first state of a run. Samples without a state, as an interrupted
+  // clear() leaves them, would else be read as this run's.
+  Status remove_samples_of_no_run();
 
   Env& env_;
   std::string folder_;

@@ -49,7 +49,7 @@ Status check_jig_due(const JigDue& jig, UtcTime now) {
 }
 
 std::string jig_due_note(const JigDue& jig, UtcTime now) {
-  return is_over(jig, now)
+  return is_over(jig, now) && !jig.exception.empty()
              ? fmt::format("the jig was due for its own calibration on {}; {} signed: {}",
                            to_iso8601(*jig.due).substr(0, 10), printable(jig.signed_by, 60),
                            printable(jig.exception, 200))

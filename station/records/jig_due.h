@@ -11,6 +11,9 @@
 // | a day before     | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
 // |                  |           |           | into the run's record                            |
 //
+// It is asked when a run starts, and again when one goes on that another program left. A run that
+// started in time may end after midnight.
+//
 // The due date is a day in UTC, and counts to its end.
 //
 // Pure functions.

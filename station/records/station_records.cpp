@@ -442,10 +442,18 @@ Result<std::string> add_decision(db::Store& store, const db::StationEvent& decis
   return store.add_station_event(decision);
 }
 
-Status may_write(db::Store& store, const std::string& serial, const std::string& constants_id) {
-  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(serial));
+Status may_write(Result<db::Store>& store, const std::string& serial,
+                 const std::string& constants_id, bool is_kept_here) {
+  const auto found = store ? store->unit_history(serial) : fail(store.error());
+  if (!found) {
+    return is_kept_here ? Status() : fail(found.error());
+  }
+  const db::UnitHistory& history = *found;
   if (std::ranges::find(history.constants, constants_id, &db::ConstantsRecord::id) ==
       history.constants.end()) {
+    if (is_kept_here) {
+      return {};
+    }
     return fail(ErrorCode::no_input, "the store does not hold these constants",
                 db::shown_id(constants_id), "measure the unit again");
   }

@@ -110,13 +110,19 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
                               const std::string& station, const Limits& limits,
                               const std::vector<EndedRun>& waiting = {});
 
-// May constants that a run put into the store be written into their unit now ("write now")?
+// May the constants of a run be written into their unit now ("write now")? The store took them when
+// the run ended, or they were kept in the journal, which goes into the store when that answers.
 //
-//   constants                                  answer
-//   of the store, and not withdrawn            yes
-//   withdrawn (db::UnitHistory::is_withdrawn)  configuration error, with the reason of who did it
-//   not of this store                          no_input error
-Status may_write(db::Store& store, const std::string& serial, const std::string& constants_id);
+//   constants                                  kept where  answer
+//   of the store, and not withdrawn            any         yes
+//   withdrawn (db::UnitHistory::is_withdrawn)  any         configuration error, with the reason of
+//                                                          who did it
+//   not of this store                          store       no_input error
+//   not of this store                          journal     yes: nobody can have withdrawn them
+//   the store does not answer                  store       its error
+//   the store does not answer                  journal     yes, likewise
+Status may_write(Result<db::Store>& store, const std::string& serial,
+                 const std::string& constants_id, bool is_kept_here);
 
 // The two configuration errors, with what lifts them.
 Error station_is_locked(const std::string& why, const std::string& station);

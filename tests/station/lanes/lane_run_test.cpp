@@ -193,6 +193,77 @@ TEST(LaneRun, ARunThatTheJournalKeepsIsNotCalledStored) {
   EXPECT_EQ(lane["result"]["kept_here"], true);
 }
 
+// The journal may have gone into the store since, and there an engineer may have withdrawn them.
+TEST(LaneRun, ConstantsThatTheJournalKeepsAreAskedAboutBeforeTheyAreWritten) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  station.is_kept_here = true;
+  station.is_withdrawn = true;
+  station.start("/api/run");
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("run");
+  });
+  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["verdict"] == "refused";
+  });
+  EXPECT_EQ(station.asked_to_write, std::vector<std::string>{"MOS2A45130007 def456 kept here"});
+}
+
+// The station is locked after the run, and opened again.
+TEST(LaneRun, ConstantsWaitOnWhereTheStationRefusesToWriteThem) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  const auto refuse = [&](bool refused) {
+    const std::lock_guard lock(station.start_mutex);
+    station.starts_refused = refused;
+  };
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  station.start("/api/run");
+  station.wait(1, stored);
+  refuse(true);
+  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  const Json refused = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("can_write");
+  });
+  EXPECT_EQ(refused["result"]["verdict"], "refused");
+  refuse(false);
+  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  station.wait(1,
+               [&](const Json& json) { return stored(json) && json["result"]["written"] == true; });
+  ASSERT_EQ(station.reports.size(), 2U);
+  const std::string& first = station.reports.front().raw_csv;
+  const std::string& second = station.reports.back().raw_csv;
+  EXPECT_TRUE(second.starts_with(first));
+  EXPECT_EQ(second.find(first.substr(0, 1000), 1), std::string::npos) << "its samples once";
+}
+
+// Ended on the last day of the jig, and begun again days later.
+TEST(LaneRun, ARunThatGoesOnIsAskedAgainWhetherItMayStart) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
+  UnfinishedRun left;
+  left.device = device;
+  left.serial = "MOS2A45130007";
+  left.station = "bench-1";
+  left.jig = "virtual";
+  left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+  ASSERT_OK(
+      RunFolder(posix_env(), folder.path() + "/state/lane-1-" + text_sha256(device).substr(0, 8))
+          .save(left));
+  Station station({device}, folder.path(), 24, {}, {}, /*refuses_starts=*/true);
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  EXPECT_THAT(lane["result"]["reasons"].dump(), HasSubstr("the jig is overdue; sign"));
+  const std::lock_guard lock(station.mutex);
+  ASSERT_EQ(station.reports.size(), 1U);
+  EXPECT_EQ(station.reports.front().verdict, JigVerdict::inconclusive);
+  EXPECT_EQ(station.reports.front().jig, "virtual");
+}
+
 TEST(LaneRun, AsksForEachPlacementAndRefusesWrongOnesWithTheReason) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7,pace=50"}, folder.path());

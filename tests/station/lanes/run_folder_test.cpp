@@ -145,6 +145,32 @@ TEST(RunFolder, TheNamesOfItsFoldersAreOnTheMedium) {
   expect_synced([](RunFolder& lane) { return lane.append("t,x,y,z,c\n"); });
 }
 
+// A power cut in clear() leaves samples without their state.
+TEST(RunFolder, SamplesWithoutAStateGoIntoNoOtherRun) {
+  for (const bool state_first : {false, true}) {
+    const tests::TemporaryFolder folder;
+    {
+      RunFolder lane(posix_env(), folder / "lane");
+      ASSERT_OK(lane.append("1,2,3,4,25\n"));
+      ASSERT_OK(lane.close());
+    }
+    RunFolder lane(posix_env(), folder / "lane");
+    UnfinishedRun run = a_run();
+    if (state_first) {
+      ASSERT_OK(lane.save(run));
+    }
+    const std::string rows = "5,6,7,8,25\n";
+    ASSERT_OK(lane.append(rows));
+    run.rows_bytes = rows.size();
+    run.rows_sha256 = text_sha256(rows);
+    ASSERT_OK(lane.save(run));
+    const auto left = lane.load();
+    ASSERT_OK(left);
+    ASSERT_TRUE(left->has_value());
+    EXPECT_EQ((*left)->resume.raw_csv, rows);
+  }
+}
+
 TEST(RunFolder, AnIncompleteLastRowIsLeftOut) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");

@@ -32,10 +32,12 @@ class Station {
   static constexpr const char* kToken = "0123456789abcdef";
 
   // `its_bench`: one that outlives this program, where the units shall.
+  // `refuses_starts`: starts_refused from the first moment on.
   explicit Station(std::vector<std::string> devices, const std::string& folder,
                    int most_streams = 24, std::shared_ptr<mocks::VirtualBench> its_bench = {},
-                   const ServerOptions& server_options = {})
-      : bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
+                   const ServerOptions& server_options = {}, bool refuses_starts = false)
+      : starts_refused(refuses_starts),
+        bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
         registry_(known_devices()),
         operators_(posix_env(), folder + "/operators.json") {
     bench_->register_in(registry_);
@@ -50,11 +52,14 @@ class Station {
         throw std::runtime_error("no such key");
       }
       const std::lock_guard lock(start_mutex);
-      return retest;
+      return starts_refused ? Result<RetestState>(
+                                  fail(ErrorCode::configuration, "the jig is overdue", {}, "sign"))
+                            : retest;
     };
-    options.may_write = [this](const std::string& serial, const std::string& id) -> Status {
+    options.may_write = [this](const WaitingConstants& waiting) -> Status {
       const std::lock_guard lock(start_mutex);
-      asked_to_write.push_back(serial + " " + id);
+      asked_to_write.push_back(fmt::format("{} {}{}", waiting.serial, waiting.id,
+                                           waiting.are_kept_here ? " kept here" : ""));
       return is_withdrawn ? Status(fail(ErrorCode::configuration, "these constants were withdrawn"))
                           : Status();
     };
@@ -158,8 +163,9 @@ class Station {
   std::vector<std::string> kinds;
   std::vector<std::string> jigs;
   std::vector<bool> authenticated;
-  std::mutex start_mutex;                   // guards the three that follow
-  RetestState retest;                       // what the unit's earlier runs demand
+  std::mutex start_mutex;                   // guards the four that follow
+  bool starts_refused = false;              // the answer to whether a run may start
+  RetestState retest;                       // ... otherwise: what the unit's earlier runs demand
   bool is_withdrawn = false;                // the constants that "write now" would write
   std::vector<std::string> asked_to_write;  // serial and constants
   bool store_is_away = false;               // and the journal with it

@@ -27,6 +27,7 @@ TEST(JigDueRule, FollowsTheTable) {
   EXPECT_EQ(jig_due_note({over, "laboratory closed", "Eve"}, now),
             "the jig was due for its own calibration on 2027-03-31; Eve signed: laboratory closed");
   EXPECT_EQ(jig_due_note({later, "laboratory closed", "Eve"}, now), "");
+  EXPECT_EQ(jig_due_note({over, "", ""}, now), "") << "it started in time, and nobody signed";
 }
 
 }  // namespace

@@ -162,12 +162,22 @@ TEST_F(StationRecords, OnlyConstantsThatApplyAreWrittenAfterwards) {
   constants.made_at = from_unix_seconds(100);
   const auto id = store_.add_constants(constants, "wGT3X-BT");
   ASSERT_OK(id);
-  EXPECT_OK(may_write(store_, "MOS2A1", *id));
-  EXPECT_FAILS(may_write(store_, "MOS2A1", std::string(32, 'a')), ErrorCode::no_input);
-  ASSERT_OK(store_.withdraw_constants(*id, "Ada", "jig out of level"));
-  const Status refused = may_write(store_, "MOS2A1", *id);
-  EXPECT_FAILS(refused, ErrorCode::configuration);
-  EXPECT_THAT(refused.error().what, HasSubstr("jig out of level"));
+  Result<db::Store> store = std::move(store_);
+  Result<db::Store> away = fail(ErrorCode::io, "the server does not answer");
+  const std::string others(32, 'a');
+  for (const bool is_kept_here : {false, true}) {
+    EXPECT_OK(may_write(store, "MOS2A1", *id, is_kept_here));
+  }
+  EXPECT_FAILS(may_write(store, "MOS2A1", others, false), ErrorCode::no_input);
+  EXPECT_OK(may_write(store, "MOS2A1", others, true));
+  EXPECT_FAILS(may_write(away, "MOS2A1", *id, false), ErrorCode::io);
+  EXPECT_OK(may_write(away, "MOS2A1", *id, true));
+  ASSERT_OK(store->withdraw_constants(*id, "Ada", "jig out of level"));
+  for (const bool is_kept_here : {false, true}) {
+    const Status refused = may_write(store, "MOS2A1", *id, is_kept_here);
+    EXPECT_FAILS(refused, ErrorCode::configuration);
+    EXPECT_THAT(refused.error().what, HasSubstr("jig out of level"));
+  }
 }
 
 TEST_F(StationRecords, CheckUnitsAndStudiesAreNoStatistics) {
