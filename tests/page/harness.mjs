@@ -28,6 +28,9 @@ export function folder() {
   return path;
 }
 
+// What the programs keep of a store stands in the user's folder: not that of who runs the tests.
+process.env.HOME = process.env.XDG_DATA_HOME = folder();
+
 // The token of a station, from the file that its user alone may read; by the station's address.
 const homes = new Map();
 const token = (url) => readFileSync(join(homes.get(new URL(url).origin), 'state', 'token'), 'utf8').trim();
