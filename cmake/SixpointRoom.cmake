@@ -14,7 +14,10 @@ if(SIXPOINT_SANITIZE)
   # ThreadSanitizer cannot be joined with the others.
   set(sanitizers $<IF:$<STREQUAL:${SIXPOINT_SANITIZE},thread>,thread,address$<COMMA>undefined>)
   target_compile_options(sixpoint_warnings INTERFACE
-    -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer
+    # A third of the time of a compilation: AddressSanitizer reports what `null` and `object-size` would, and nothing here
+    # makes a pointer to a wider type out of bytes.
+    -fno-sanitize=null,object-size,alignment)
   target_link_options(sixpoint_warnings INTERFACE -fsanitize=${sanitizers})
 endif()
 
