@@ -203,7 +203,8 @@ struct VirtualUnit::Commands {
     if (unit.options_.battery_mv < kLowBattery_mv) {
       return ReplyCode::battery_low;
     }
-    if (unit.flash_full_since_ || unit.flash_left() < kLeastFlash_bytes) {
+    if (unit.flash_full_since_ || unit.flash_left() < kLeastFlash_bytes ||
+        unit.images_.size() >= device::kMostRecordings) {
       return ReplyCode::storage_full;
     }
     unit.clock_set_to_ = from_unix_seconds(unix_time_s);
@@ -298,7 +299,7 @@ void VirtualUnit::take_report(std::span<const std::uint8_t> report, nanoseconds 
     return;
   }
   if (request->sequence != 0 && last_request_ == *request) {
-    replies_.push_back(last_reply_);
+    replies_.put(last_reply_);
     return;
   }
   const Message reply = answer(*request, now);
@@ -307,7 +308,7 @@ void VirtualUnit::take_report(std::span<const std::uint8_t> report, nanoseconds 
   }
   last_reply_ = device::encode(reply);
   last_request_ = std::move(*request);
-  replies_.push_back(last_reply_);
+  replies_.put(last_reply_);
 }
 
 // A whole report of another protocol version gets an answer; everything else is noise on the cable.
@@ -317,11 +318,11 @@ void VirtualUnit::answer_other_version(std::span<const std::uint8_t> report) {
   }
   const std::uint16_t crc = crc_ccitt(report.first(device::kReportBytes - 2));
   if (report[62] == (crc & 0xFFU) && report[63] == (crc >> 8U)) {
-    replies_.push_back(device::encode({ReportKind::reply,
-                                       static_cast<std::uint16_t>(report[2] | (report[3] << 8U)),
-                                       static_cast<Command>(report[4]),
-                                       ReplyCode::unsupported_version,
-                                       {}}));
+    replies_.put(device::encode({ReportKind::reply,
+                                 static_cast<std::uint16_t>(report[2] | (report[3] << 8U)),
+                                 static_cast<Command>(report[4]),
+                                 ReplyCode::unsupported_version,
+                                 {}}));
   }
 }
 

@@ -351,5 +351,34 @@ TEST(VirtualUnitCommands, AClockThatJumpsBackBelowZeroRunsOnFromZero) {
   EXPECT_EQ(time_of(asked).first, 8'500'000U) << "back as far as it says";
 }
 
+// A host that asks and never reads takes no memory without end; what it asked last is there.
+TEST(VirtualUnitCommands, AHostThatNeverReadsGetsTheNewestReplies) {
+  Asked asked;
+  for (std::uint16_t sequence = 1; sequence <= 1000; ++sequence) {
+    asked.unit.take_report(report_of(1, sequence, kIdentify, {}), asked.now);
+    asked.unit.take_report(report_of(1, sequence, kIdentify, {}), asked.now);  // the kept reply
+    asked.unit.take_report(report_of(2, sequence, kIdentify, {}), asked.now);  // another version
+  }
+  std::size_t replies = 0;
+  std::optional<device::Report> last;
+  for (auto reply = asked.unit.next_report(asked.now); reply;
+       reply = asked.unit.next_report(asked.now)) {
+    ++replies;
+    last = reply;
+  }
+  EXPECT_EQ(replies, 64U);
+  EXPECT_EQ(last.value()[2], low(1000));
+  EXPECT_EQ(last.value()[3], high(1000));
+}
+
+// docs/protocol.md: a unit holds at most 4096 recordings.
+TEST(VirtualUnitCommands, NoRecordingBeginsWhereThereAre4096) {
+  Asked asked;
+  for (int i = 0; i < 4096; ++i) {
+    ASSERT_TRUE(asked.unit.keep_recording({1}, {}));
+  }
+  EXPECT_EQ(asked.ask(kStartRecording, kRecord).code, 6);
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks
