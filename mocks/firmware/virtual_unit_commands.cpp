@@ -6,6 +6,7 @@
 #include "base/crc_ccitt.h"
 #include "device/wire/payload.h"
 #include "mocks/firmware/virtual_unit.h"
+#include "sim/recording.h"
 
 namespace sixpoint::mocks {
 
@@ -57,7 +58,7 @@ struct VirtualUnit::Commands {
         static_cast<std::uint16_t>(std::lround(unit.options_.truth.accel_scale_lsb_per_g));
     identity.serial = unit.options_.truth.serial;
     identity.firmware = unit.options_.truth.firmware;
-    identity.model = unit.options_.truth.serial.starts_with("MOS") ? "wGT3XBT" : "GT9X";
+    identity.model = sim::device_type_of(unit.options_.truth.serial);
     exchange.out = device::encode_identity(identity);
     return ReplyCode::ok;
   }

@@ -8,6 +8,7 @@
 
 #include "device/wire/protocol.h"
 #include "mocks/firmware/virtual_unit.h"
+#include "sim/recording.h"
 
 namespace sixpoint::mocks {
 namespace {
@@ -124,6 +125,20 @@ TEST(VirtualUnitCommands, IdentifyHasTheFieldsOfThePage) {
   put("1.5.0", 12);
   put("wGT3XBT", 12);
   EXPECT_EQ(asked.ask(kIdentify), (Reply{0, expected}));
+}
+
+// Real units of the family call themselves "Link" in info.txt.
+TEST(VirtualUnitCommands, ALinkIsCalledTheSameOnTheWireAndInInfo) {
+  sim::GivenProperties given;
+  given.serial = "TAS1H30182785";
+  VirtualUnitOptions options;
+  options.truth = sim::draw_unit(7, given);
+  VirtualUnit unit(options);
+  unit.take_report(report_of(1, 1, kIdentify, {}), nanoseconds(0));
+  const auto answer = unit.next_report(nanoseconds(0));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(answer->data()) + 8 + 36), "Link");
+  EXPECT_EQ(sim::recording_info(options.truth, {}, {}, 30, 4000).device_type(), "Link");
 }
 
 // The table of codes: what each command is refused with.
