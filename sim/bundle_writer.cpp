@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "base/random.h"
+#include "gt3x/forms/model.h"
 #include "gt3x/recording_writer.h"
 #include "sim/recording.h"
 
@@ -38,7 +39,7 @@ std::string protocol_text(const Scenario& scenario, const ProtocolRun& run,
   }
   head["gravity_g"] = run.gravity_g;
   head["unit"] = {{"serial", scenario.unit.serial},
-                  {"model", scenario.unit.serial.starts_with("TAS") ? "GT9X Link" : "wGT3X-BT"},
+                  {"model", gt3x::model_of(scenario.unit.serial)},
                   {"firmware", scenario.unit.firmware}};
   // One segment a line, so that people can read it.
   std::string text = head.dump();

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/model.h"
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"
 #include "gt3x/recording_writer.h"
@@ -154,12 +155,16 @@ void append_second(Bytes& log, UtcTime time, std::span<const gt3x::Counts> sampl
                       unix_time(time), payload);
 }
 
+std::string_view device_type_of(std::string_view serial) {
+  return gt3x::model_of(serial) == "GT9X Link" ? "Link" : "wGT3XBT";
+}
+
 gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz,
                           int battery_mv) {
   gt3x::Info info;
   const auto ticks = [](UtcTime time) { return std::to_string(gt3x::to_ticks(time)); };
   info.set("Serial Number", unit.serial);
-  info.set("Device Type", unit.serial.starts_with("MOS") ? "wGT3XBT" : "GT9X Link");
+  info.set("Device Type", std::string(device_type_of(unit.serial)));
   info.set("Firmware", unit.firmware);
   info.set("Battery Voltage", fmt::format("{:.2f}", battery_mv / 1000.0));
   info.set("Sample Rate", std::to_string(rate_hz));

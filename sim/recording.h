@@ -9,6 +9,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "base/env.h"
 #include "gt3x/forms/info.h"
@@ -22,6 +23,10 @@ Bytes log_preamble(const UnitTruth& unit, UtcTime start, int rate_hz);
 
 // One second of samples as an ACTIVITY (12 bits) or ACTIVITY2 record (16).
 void append_second(Bytes& log, UtcTime time, std::span<const gt3x::Counts> samples, bool wide);
+
+// What a unit calls itself, in info.txt ("Device Type") and on the wire, as real ones do: "wGT3XBT",
+// or "Link" where gt3x::model_of() of its serial number is "GT9X Link".
+std::string_view device_type_of(std::string_view serial);
 
 // info.txt. `end` is the time after the last sample; `battery_mv` as the unit has it when the file is
 // made.

@@ -20,6 +20,13 @@ namespace {
 
 constexpr double kLongest_s = 400 * 86'400.0;
 constexpr std::size_t kMostMotions = 100'000;
+// What 'gap diagnose' takes of a bundle (gap/recording/protocol.cpp): a scenario makes no others.
+constexpr std::size_t kMostSegments = 1'000;
+constexpr double kLeastGravity_g = 0.99;
+constexpr double kMostGravity_g = 1.01;
+constexpr double kColdest_c = -100;
+constexpr double kHottest_c = 200;
+constexpr double kLeastFrequency_hz = 1e-3;
 
 Status parse_sensor(const Section& parent, std::string_view key,
                     std::optional<PerAxis<double>>& sensitivity,
@@ -162,9 +169,13 @@ Status parse_segment_temperature(const Section& section, std::array<double, 2>& 
     return {};
   }
   const Json list = json->is_array() ? *json : Json::array({*json, *json});
-  if (list.size() != 2 || !list[0].is_number() || !list[1].is_number() ||
-      !(std::abs(list[0].get<double>()) <= 200) || !(std::abs(list[1].get<double>()) <= 200)) {
-    return wrong(section.path("temperature_c"), "this must be a number or [start, end], in C");
+  const auto is_possible = [](const Json& value) {
+    return value.is_number() && value.get<double>() >= kColdest_c &&
+           value.get<double>() <= kHottest_c;
+  };
+  if (list.size() != 2 || !is_possible(list[0]) || !is_possible(list[1])) {
+    return wrong(section.path("temperature_c"),
+                 "this must be a number or [start, end], in C, from -100 to 200");
   }
   commanded_c = {list[0].get<double>(), list[1].get<double>()};
   return {};
@@ -205,7 +216,12 @@ Result<ProtocolSegment> parse_segment(const Json& json, const std::string& path)
     Tone tone;
     tone.direction_lab = Eigen::Vector3d::UnitZ();
     SIXPOINT_CHECK(parse_tone(tone_section, tone));
+    if (tone.frequency_hz < kLeastFrequency_hz) {
+      return wrong(tone_section.path("frequency_hz"), "this must be 0.001 or more");
+    }
     segment.vibration = tone;
+  } else if (segment.kind == SegmentKind::vibration) {
+    return wrong(section.path("vibration"), "a segment of this kind must say which");
   }
   return segment;
 }
@@ -222,9 +238,10 @@ Result<std::vector<ProtocolSegment>> parse_segments(const Json& json, std::uint6
     }
     return draw_protocol(*standard, seed, rate_hz);
   }
-  if (!json.is_array() || json.empty() || json.size() > kMostMotions) {
+  if (!json.is_array() || json.empty() || json.size() > kMostSegments) {
     return wrong("/protocol",
-                 "this must be production, production+, engineering, or a list of segments");
+                 "this must be production, production+, engineering, or a list of 1,000 segments "
+                 "at most");
   }
   std::vector<ProtocolSegment> segments;
   std::uint64_t end = 0;
@@ -460,7 +477,9 @@ Result<Scenario> parse_document(const Json& json) {
     scenario.filter = *parsed;
   }
   SIXPOINT_CHECK(top.number("temperature_c", scenario.temperature_c, -100, 200));
-  SIXPOINT_CHECK(top.number("gravity_g", scenario.gravity_g, 0, 10));
+  const bool in_bundle = protocol != nullptr;
+  SIXPOINT_CHECK(top.number("gravity_g", scenario.gravity_g, in_bundle ? kLeastGravity_g : 0.0,
+                            in_bundle ? kMostGravity_g : 10.0));
   SIXPOINT_CHECK(top.number("turn_s", scenario.turn_s, 0, 3600));
 
   SIXPOINT_CHECK(parse_effects(top, scenario));

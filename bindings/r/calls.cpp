@@ -177,18 +177,36 @@ double sixpoint_reading_rows(const sixpoint_reading* reading) {
   return static_cast<double>(reading->rows.rows);
 }
 
-void sixpoint_reading_columns(const sixpoint_reading* reading, double* x_g, double* y_g,
-                              double* z_g, double* times_s) {
-  const PerAxis<double*> axes = {x_g, y_g, z_g};
-  std::array<std::jthread, 3> threads;
-  for (std::size_t axis = 0; axis < axes.size(); ++axis) {
-    try {
-      threads[axis] = std::jthread([&, axis] { fill_axis(*reading, axis, axes[axis]); });
-    } catch (const std::system_error&) {  // the system has no thread for it
-      fill_axis(*reading, axis, axes[axis]);
+char* sixpoint_reading_columns(const sixpoint_reading* reading, double* x_g, double* y_g,
+                               double* z_g, double* times_s) {
+  return guarded([&]() -> char* {
+    const PerAxis<double*> axes = {x_g, y_g, z_g};
+    PerAxis<std::exception_ptr> failures;  // what leaves a thread's function ends the program
+    const auto fill = [&](std::size_t axis) {
+      try {
+        fill_axis(*reading, axis, axes[axis]);
+      } catch (...) {
+        failures[axis] = std::current_exception();
+      }
+    };
+    {
+      std::array<std::jthread, 3> threads;
+      for (std::size_t axis = 0; axis < axes.size(); ++axis) {
+        try {
+          threads[axis] = std::jthread(fill, axis);
+        } catch (const std::system_error&) {  // the system has no thread for it
+          fill(axis);
+        }
+      }
+      fill_times(*reading, times_s);
     }
-  }
-  fill_times(*reading, times_s);
+    for (const std::exception_ptr& failure : failures) {
+      if (failure) {
+        std::rethrow_exception(failure);
+      }
+    }
+    return nullptr;
+  });
 }
 
 char* sixpoint_reading_facts(const sixpoint_reading* reading, char** json) {

@@ -20,8 +20,8 @@ void sixpoint_reading_close(sixpoint_reading* reading);
 double sixpoint_reading_rows(const sixpoint_reading* reading);
 /* Fills columns of that many values. The first three: g, rounded to 0.001 half away from zero as in
    the vendor's CSV; the last: seconds since 1970 by the recording's clock, rounded to 0.01. */
-void sixpoint_reading_columns(const sixpoint_reading* reading, double* x_g, double* y_g,
-                              double* z_g, double* times_s);
+char* sixpoint_reading_columns(const sixpoint_reading* reading, double* x_g, double* y_g,
+                               double* z_g, double* times_s);
 /* {"facts": as `sixpoint inspect`, "info": {...}, "gaps": [{unix_start, seconds, kind}]} */
 char* sixpoint_reading_facts(const sixpoint_reading* reading, char** json);
 

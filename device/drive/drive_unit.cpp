@@ -145,19 +145,13 @@ Status DriveUnit::download(const RecordingInfo& recording, FileSystem& files,
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
   SIXPOINT_CHECK(writer.add(kLogName, source));
   SIXPOINT_CHECK(writer.add(kInfoName, std::move(info)));
-  SIXPOINT_CHECK(writer.commit());
-  Status same = [&]() -> Status {
-    SIXPOINT_CHECK(identify());
-    if (hash.finish() != recording.sha256) {
-      return fail(ErrorCode::bad_data, "log.bin changed while it was read", address_,
-                  "stop the unit's recording, then copy it again");
-    }
-    return {};
-  }();
-  if (!same) {
-    SIXPOINT_CHECK(files.remove(path));
+  // Before the file has its name: a recording that is not the announced one never has it.
+  SIXPOINT_CHECK(identify());
+  if (hash.finish() != recording.sha256) {
+    return fail(ErrorCode::bad_data, "log.bin changed while it was read", address_,
+                "stop the unit's recording, then copy it again");
   }
-  return same;
+  return writer.commit();
 }
 
 void register_drive(UnitRegistry& registry) {

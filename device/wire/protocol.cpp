@@ -231,6 +231,14 @@ Result<RecordingEntry> decode_recording(std::span<const std::uint8_t> payload) {
   if (!reader.ok()) {
     return damaged("the entry of a recording is too short");
   }
+  if (entry.count > kMostRecordings) {
+    return damaged(
+        fmt::format("a list of {} recordings, of {} at most", entry.count, kMostRecordings));
+  }
+  if (entry.info.bytes > kMostRecordingBytes) {
+    return damaged(fmt::format("a recording of {} bytes, of {} at most", entry.info.bytes,
+                               kMostRecordingBytes));
+  }
   std::copy(digest.begin(), digest.end(), entry.info.sha256.begin());
   return entry;
 }

@@ -98,6 +98,13 @@ struct RecordingEntry {
   RecordingInfo info;       // meaningless where count is 0
 };
 Bytes encode_recording(const RecordingEntry& entry);
+
+// What a station believes of a unit's list (docs/protocol.md): a longer list is asked for entry by
+// entry, and a recording is written to the disk until so many bytes came. No unit of the family has
+// more than 4 GB of memory.
+inline constexpr std::uint16_t kMostRecordings = 4096;
+inline constexpr std::uint64_t kMostRecordingBytes = 4ULL << 30U;
+
 Result<RecordingEntry> decode_recording(std::span<const std::uint8_t> payload);
 
 inline constexpr std::size_t kBulkHeaderBytes = 20;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -41,7 +42,7 @@ sim::ProtocolRun run_of(const RecordedBundle& recorded, std::uint64_t seed) {
       run.noise_mg[axis] = recorded.diagnosis.unit.noise_mg[axis];
     }
   }
-  double end_s = 0;
+  double end_s = bundle.segments.front().host_start_s;
   for (const Segment& segment : bundle.segments) {
     constexpr std::array kKinds = {sim::SegmentKind::still, sim::SegmentKind::vibration,
                                    sim::SegmentKind::ramp, sim::SegmentKind::soak};
@@ -61,8 +62,10 @@ sim::ProtocolRun run_of(const RecordedBundle& recorded, std::uint64_t seed) {
     end_s = std::max(end_s,
                      segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz);
   }
-  for (int second = 0; second <= static_cast<int>(end_s) + 1; ++second) {
-    const double time_s = second;
+  // The host's clock may have begun long before the first segment.
+  auto second = static_cast<std::int64_t>(std::floor(bundle.segments.front().host_start_s));
+  for (; static_cast<double>(second) <= end_s + 1; ++second) {
+    const auto time_s = static_cast<double>(second);
     run.temperature.push_back({time_s, bundle.temperature_at(time_s)});
   }
   return run;

@@ -191,6 +191,23 @@ Status check_segment(const Bundle& bundle, const Segment& segment, const std::st
   return {};
 }
 
+// A simulation of the run has a temperature for each of its seconds. A scenario may be as long.
+Status check_span(const Bundle& bundle, const std::string& path) {
+  constexpr double kMostDays = 400;
+  const double begin_s = bundle.segments.front().host_start_s;
+  double end_s = begin_s;
+  for (const Segment& segment : bundle.segments) {
+    end_s = std::max(end_s,
+                     segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz);
+  }
+  if (end_s - begin_s > kMostDays * 86'400) {
+    return bad(path, fmt::format("from the first segment to the end of the last there are more "
+                                 "than {} days: diagnose parts of it",
+                                 kMostDays));
+  }
+  return {};
+}
+
 // Whether the unit stayed where it was between two segments.
 bool stays(const Segment& last, const Segment& now, double rate_hz) {
   constexpr double kNoPause_s = 0.05;    // convention: rounding of the protocol's times
@@ -271,6 +288,7 @@ Status read_protocol(FileSystem& files, const std::string& path, Bundle& bundle)
     SIXPOINT_CHECK(check_segment(bundle, segment, where));
     bundle.segments.push_back(std::move(segment));
   }
+  SIXPOINT_CHECK(check_span(bundle, path));
   // A shaker runs through its tones whatever the unit's sample rate is.
   if (const auto folded = std::count_if(
           bundle.segments.begin(), bundle.segments.end(),

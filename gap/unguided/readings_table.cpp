@@ -97,7 +97,13 @@ class TextLines {
       used_ = have_;
       return ready_ > 0;
     }
-    while (ready_ == 0 && !ended_) {
+    while (ready_ == 0) {
+      if (member_ended_) {
+        SIXPOINT_ASSIGN(const bool is_next, begin_next_member());
+        if (!is_next) {
+          return false;
+        }
+      }
       if (used_ == have_) {
         SIXPOINT_CHECK(fill());
         if (have_ == 0) {
@@ -114,9 +120,33 @@ class TextLines {
       }
       used_ = have_ - stream_.avail_in;
       ready_ = plain_.size() - stream_.avail_out;
-      ended_ = result == Z_STREAM_END;
+      member_ended_ = result == Z_STREAM_END;
     }
-    return ready_ > 0;
+    return true;
+  }
+
+  // A gzip file is one member behind the other (RFC 1952, 2.2); bgzip and 'cat a.gz b.gz' make
+  // many. Zeros may stand behind the last one (gzip(1): they fill a tape's block). False at the
+  // end.
+  Result<bool> begin_next_member() {
+    bool is_padded = false;
+    for (;; ++used_) {
+      if (used_ == have_) {
+        SIXPOINT_CHECK(fill());
+        if (have_ == 0) {
+          return false;
+        }
+      }
+      if (packed_[used_] != 0) {
+        break;
+      }
+      is_padded = true;
+    }
+    if (is_padded || inflateReset(&stream_) != Z_OK) {
+      return fail(ErrorCode::bad_data, "the gzip file is damaged", path_, "copy it again");
+    }
+    member_ended_ = false;
+    return true;
   }
 
   std::unique_ptr<ReadableFile> file_;
@@ -127,7 +157,7 @@ class TextLines {
   std::size_t have_ = 0, used_ = 0;  // of packed_
   std::size_t ready_ = 0, at_ = 0;   // of plain_
   bool is_gzip_ = false;
-  bool ended_ = false;
+  bool member_ended_ = false;
   z_stream stream_{};
 };
 

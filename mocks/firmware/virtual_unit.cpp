@@ -177,10 +177,8 @@ std::optional<nanoseconds> VirtualUnit::next_due() const {
 }
 
 std::optional<device::Report> VirtualUnit::next_report(nanoseconds now) {
-  if (!replies_.empty()) {
-    const device::Report report = replies_.front();
-    replies_.pop_front();
-    return report;
+  if (const auto reply = replies_.take()) {
+    return reply;
   }
   const auto due = next_due();
   if (!due || *due > now) {

@@ -13,7 +13,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -24,6 +23,7 @@
 #include "device/wire/protocol.h"
 #include "mocks/firmware/page_memory.h"
 #include "mocks/firmware/pose_history.h"
+#include "mocks/firmware/reply_queue.h"
 #include "sim/simulator.h"
 #include "sim/unit_truth.h"
 
@@ -151,7 +151,7 @@ class VirtualUnit {
   std::optional<Staged> staged_;
   std::optional<Download> download_;
   std::uint64_t downloads_ = 0;
-  std::deque<device::Report> replies_;
+  ReplyQueue replies_;
   std::optional<device::Message> last_request_;
   device::Report last_reply_{};
   std::vector<Bytes> images_;

@@ -6,6 +6,7 @@
 #include "base/crc_ccitt.h"
 #include "device/wire/payload.h"
 #include "mocks/firmware/virtual_unit.h"
+#include "sim/recording.h"
 
 namespace sixpoint::mocks {
 
@@ -57,7 +58,7 @@ struct VirtualUnit::Commands {
         static_cast<std::uint16_t>(std::lround(unit.options_.truth.accel_scale_lsb_per_g));
     identity.serial = unit.options_.truth.serial;
     identity.firmware = unit.options_.truth.firmware;
-    identity.model = unit.options_.truth.serial.starts_with("MOS") ? "wGT3XBT" : "GT9X";
+    identity.model = sim::device_type_of(unit.options_.truth.serial);
     exchange.out = device::encode_identity(identity);
     return ReplyCode::ok;
   }
@@ -203,7 +204,8 @@ struct VirtualUnit::Commands {
     if (unit.options_.battery_mv < kLowBattery_mv) {
       return ReplyCode::battery_low;
     }
-    if (unit.flash_full_since_ || unit.flash_left() < kLeastFlash_bytes) {
+    if (unit.flash_full_since_ || unit.flash_left() < kLeastFlash_bytes ||
+        unit.images_.size() >= device::kMostRecordings) {
       return ReplyCode::storage_full;
     }
     unit.clock_set_to_ = from_unix_seconds(unix_time_s);
@@ -298,7 +300,7 @@ void VirtualUnit::take_report(std::span<const std::uint8_t> report, nanoseconds 
     return;
   }
   if (request->sequence != 0 && last_request_ == *request) {
-    replies_.push_back(last_reply_);
+    replies_.put(last_reply_);
     return;
   }
   const Message reply = answer(*request, now);
@@ -307,7 +309,7 @@ void VirtualUnit::take_report(std::span<const std::uint8_t> report, nanoseconds 
   }
   last_reply_ = device::encode(reply);
   last_request_ = std::move(*request);
-  replies_.push_back(last_reply_);
+  replies_.put(last_reply_);
 }
 
 // A whole report of another protocol version gets an answer; everything else is noise on the cable.
@@ -317,11 +319,11 @@ void VirtualUnit::answer_other_version(std::span<const std::uint8_t> report) {
   }
   const std::uint16_t crc = crc_ccitt(report.first(device::kReportBytes - 2));
   if (report[62] == (crc & 0xFFU) && report[63] == (crc >> 8U)) {
-    replies_.push_back(device::encode({ReportKind::reply,
-                                       static_cast<std::uint16_t>(report[2] | (report[3] << 8U)),
-                                       static_cast<Command>(report[4]),
-                                       ReplyCode::unsupported_version,
-                                       {}}));
+    replies_.put(device::encode({ReportKind::reply,
+                                 static_cast<std::uint16_t>(report[2] | (report[3] << 8U)),
+                                 static_cast<Command>(report[4]),
+                                 ReplyCode::unsupported_version,
+                                 {}}));
   }
 }
 

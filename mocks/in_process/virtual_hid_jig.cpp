@@ -223,17 +223,10 @@ void VirtualHidJig::take_report(std::span<const std::uint8_t> report, nanosecond
     last_reply_ = device::encode(answer(*request, now));
     last_request_ = std::move(*request);
   }
-  replies_.push_back(last_reply_);
+  replies_.put(last_reply_);
 }
 
-std::optional<device::Report> VirtualHidJig::next_report() {
-  if (replies_.empty()) {
-    return std::nullopt;
-  }
-  const device::Report report = replies_.front();
-  replies_.pop_front();
-  return report;
-}
+std::optional<device::Report> VirtualHidJig::next_report() { return replies_.take(); }
 
 device::Link link_to_jig(std::shared_ptr<VirtualHidJig> jig, std::shared_ptr<Clock> clock) {
   device::Link link;

@@ -20,6 +20,7 @@
 
 #include "device/jig_registry.h"
 #include "device/jigs/hid_jig.h"
+#include "mocks/firmware/reply_queue.h"
 #include "mocks/in_process/virtual_jig.h"
 
 namespace sixpoint::mocks {
@@ -61,7 +62,7 @@ class VirtualHidJig {
   int turns_ = 0;
   std::optional<device::Message> last_request_;
   device::Report last_reply_{};
-  std::deque<device::Report> replies_;
+  ReplyQueue replies_;
 };
 
 // The link to such a jig. Both what it shares and `physics` must outlive it.

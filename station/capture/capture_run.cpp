@@ -215,7 +215,7 @@ class CaptureRun {
     }
     if (resume) {
       progress_ = *resume;
-      if (std::exchange(progress_.asked_again, false)) {
+      if (progress_.asked_again) {
         remove_beside();
       }
       SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
@@ -233,7 +233,7 @@ class CaptureRun {
       if (ended && !all_sides) {
         ended = fail(all_sides.error());
       }
-      if (repeats > 0 && (!ended || !*all_sides)) {
+      if (progress_.asked_again && (!ended || !*all_sides)) {
         return judged_as_it_is(ended ? "it was stopped" : ended.error().brief());
       }
       SIXPOINT_CHECK(ended);
@@ -241,8 +241,8 @@ class CaptureRun {
         report_.stopped = true;
         return report_;
       }
-      const Status fetched = repeats == 0 ? fetch(options_.output) : fetch_anew();
-      if (!fetched && repeats > 0 && fetched.error().code != ErrorCode::internal) {
+      const Status fetched = progress_.asked_again ? fetch_anew() : fetch(options_.output);
+      if (!fetched && progress_.asked_again && fetched.error().code != ErrorCode::internal) {
         return judged_as_it_is(fetched.error().brief());
       }
       SIXPOINT_CHECK(fetched);
@@ -332,7 +332,12 @@ class CaptureRun {
   }
 
   // A side that cannot be repeated takes nothing away from what was recorded before.
-  CaptureReport judged_as_it_is(const std::string& why) {
+  Result<CaptureReport> judged_as_it_is(const std::string& why) {
+    if (report_.file.empty()) {  // an earlier program made and judged it
+      SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, options_.output));
+      report_.file = options_.output;
+      SIXPOINT_CHECK(check_and_solve(env_, options_, options_.output, std::nullopt, report_));
+    }
     report_.notes.push_back("no side was repeated, the recording of before is judged: " + why);
     return report_;
   }
@@ -417,7 +422,8 @@ class CaptureRun {
   }
 
   // After a side was repeated: all is downloaded and judged beside what this capture made before,
-  // and then takes its place. Where that fails, file and judgement of before stay.
+  // also in an earlier program, and then takes its place. Where that fails, file and judgement of
+  // before stay.
   Status fetch_anew() {
     const CaptureReport before = report_;
     report_.pieces.clear();
@@ -425,7 +431,7 @@ class CaptureRun {
     const std::string beside = beside_name();
     Status done = fetch(beside);
     if (done) {
-      done = take_place(beside, before.pieces);
+      done = take_place(beside);
     }
     if (!done) {
       remove_beside();
@@ -436,7 +442,7 @@ class CaptureRun {
     return done;
   }
 
-  Status take_place(const std::string& beside, const std::vector<std::string>& before) {
+  Status take_place(const std::string& beside) {
     SIXPOINT_CHECK(env_.files.rename(beside, options_.output));
     // The new file holds from here on. A piece that cannot be renamed keeps its name.
     report_.file = options_.output;
@@ -447,7 +453,9 @@ class CaptureRun {
         pieces[i] = std::move(name);
       }
     }
-    for (const std::string& name : before) {
+    // Pieces of before, also those that an earlier program made (may_make_pieces()).
+    for (std::size_t number = 1; number <= poses_.size(); ++number) {
+      const std::string name = piece_name(options_.output, number);
       if (std::find(pieces.begin(), pieces.end(), name) == pieces.end()) {
         static_cast<void>(env_.files.remove(name));
       }

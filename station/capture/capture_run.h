@@ -63,7 +63,8 @@ struct CaptureResume {
   };
   UtcTime started{};
   std::vector<Side> done;
-  // Sides were asked for again: no file had the names of the second download then ("c-new.gt3x",
+  // Sides were asked for again. So the output is there, and stays until the new one is whole. No
+  // other file had the names of pieces and of the second download then ("c-1.gt3x", "c-new.gt3x",
   // "c-new-1.gt3x" ... for "c.gt3x"), so those that have them now are this capture's.
   bool asked_again = false;
 };
@@ -100,8 +101,9 @@ struct CaptureReport {
   std::string serial;
   std::string firmware;
   calib::FilterConfiguration recording_filter = calib::FilterConfiguration::current;
-  // Or an axis repeated itself; then nothing is solved.
-  std::vector<std::string> refusal;  // of why_recording_cannot_help(); then nothing was recorded
+  // Of why_recording_cannot_help(): then nothing was recorded. Or that an axis repeated itself:
+  // then nothing is solved.
+  std::vector<std::string> refusal;
   bool stopped = false;  // by the person; the recording was stopped and left in the unit
   std::string file;
   std::string file_sha256;

@@ -62,13 +62,17 @@ LaneAnswer<Lanes::Lane*> Lanes::lane(std::size_t number) const {
 LaneAnswer<Lanes::Lane*> Lanes::lane_to_start(std::size_t number, const std::string& client) {
   return lane(number).and_then([&](Lane* chosen) -> LaneAnswer<Lane*> {
     const std::lock_guard lock(mutex_);
-    const auto unmatched = unmatched_.find(client);
-    if (unmatched != unmatched_.end() && !chosen->holds(unmatched->second)) {
+    const auto unmatched = std::find_if(unmatched_.begin(), unmatched_.end(),
+                                        [&](const auto& each) { return each.client == client; });
+    if (unmatched == unmatched_.end()) {
+      return chosen;
+    }
+    if (!chosen->holds(unmatched->serial)) {
       return lane_conflict(fmt::format("the label of {} was scanned, and this is another unit",
-                                       printable(unmatched->second, 40)),
+                                       printable(unmatched->serial, 40)),
                            "plug in the unit that was scanned, or scan the label of this one");
     }
-    unmatched_.erase(client);
+    unmatched_.erase(unmatched);
     return chosen;
   });
 }
@@ -99,9 +103,13 @@ LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& clien
   return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client, name); });
 }
 
+void Lanes::forget_scan(const std::string& client) {
+  std::erase_if(unmatched_, [&](const auto& each) { return each.client == client; });
+}
+
 void Lanes::dismiss_scan(const std::string& client) {
   const std::lock_guard lock(mutex_);
-  unmatched_.erase(client);
+  forget_scan(client);
 }
 
 LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial,
@@ -112,9 +120,11 @@ LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& seria
                                     [&](const auto& each) { return each->holds(serial); });
     if (found == lanes_.end()) {
       const std::lock_guard lock(mutex_);
-      if (unmatched_.size() < kMostUnmatched) {
-        unmatched_[client] = serial;
+      forget_scan(client);
+      if (unmatched_.size() == kMostUnmatched) {  // browsers that were left long ago
+        unmatched_.pop_front();
       }
+      unmatched_.push_back({client, serial});
       return lane_conflict(fmt::format("no lane holds a unit {}", printable(serial, 40)),
                            "plug the unit in, or check that its label is its own");
     }

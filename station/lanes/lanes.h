@@ -22,8 +22,8 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -185,13 +185,19 @@ class Lanes {
   Lanes();
   LaneAnswer<Lane*> lane(std::size_t number) const;
 
+  struct Unmatched {
+    std::string client;
+    std::string serial;  // was scanned, and no lane held it
+  };
+  void forget_scan(const std::string& client);  // under the mutex
+
   // Refuses while this client's last scan was of a unit that is not in this lane.
   LaneAnswer<Lane*> lane_to_start(std::size_t number, const std::string& client);
 
   std::unique_ptr<Shared> shared_;
   std::vector<std::unique_ptr<Lane>> lanes_;
-  std::mutex mutex_;                              // guards what follows
-  std::map<std::string, std::string> unmatched_;  // client -> the serial that no lane held
+  std::mutex mutex_;                 // guards what follows
+  std::deque<Unmatched> unmatched_;  // oldest first, one of a client
 };
 
 }  // namespace sixpoint::station

@@ -390,6 +390,7 @@ ApiAnswer Api::post(const ApiRequest& request) {
 }
 
 ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
+  const bool is_capture = request.path == "/api/capture";
   std::size_t lane = 1;
   if (body.contains("lane")) {
     if (!body["lane"].is_number_unsigned()) {
@@ -407,6 +408,9 @@ ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
     if (body.contains(key) && !body[key].is_boolean()) {
       return bad_field(key, "true or false");
     }
+    if (is_capture && body.value(key, false)) {
+      return bad_field(key, "false: a capture writes no constants");
+    }
   }
   const auto who = signer(request, *operator_name, OperatorRole::technician);
   if (!who) {
@@ -418,8 +422,8 @@ ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
   order.client = client_of(request);
   order.write = body.value("write", false);
   order.last_run = body.value("last_run", false);
-  const auto started = request.path == "/api/capture" ? parts_.lanes.start_capture(lane, order)
-                                                      : parts_.lanes.start(lane, order);
+  const auto started =
+      is_capture ? parts_.lanes.start_capture(lane, order) : parts_.lanes.start(lane, order);
   return started ? answer(202, {{"lane", lane}, {"started", true}}) : lane_refusal(started.error());
 }
 

@@ -1,5 +1,6 @@
 // Files below the station's folder: listed, checked, repaired.
 #include <algorithm>
+#include <optional>
 
 #include "base/env.h"
 #include "calib/solve.h"
@@ -14,6 +15,15 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostListed = 2000;  // files of one folder
+
+// A path of a body, as long as list_files() offers them: inside() says which are permitted. Empty
+// where it is missing, nothing where it is no text.
+std::optional<std::string> path_text(const Json& body, const char* key) {
+  if (!body.contains(key) || body[key].is_null()) {
+    return std::string();
+  }
+  return body[key].is_string() ? std::optional(body[key].get<std::string>()) : std::nullopt;
+}
 
 }  // namespace
 
@@ -61,7 +71,7 @@ ApiAnswer Api::list_files(const std::string& relative) const {
 }
 
 ApiAnswer Api::check_file(const Json& body) {
-  const auto name = text_of(body, "file");
+  const auto name = path_text(body, "file");
   if (!name || name->empty()) {
     return bad_field("file", "a file below the station's folder");
   }
@@ -104,9 +114,9 @@ ApiAnswer Api::check_file(const Json& body) {
 }
 
 ApiAnswer Api::start_repair(const Json& body) {
-  const auto folder = text_of(body, "folder");
-  const auto output = text_of(body, "output");
-  const auto calibration = text_of(body, "calibration_file");
+  const auto folder = path_text(body, "folder");
+  const auto output = path_text(body, "output");
+  const auto calibration = path_text(body, "calibration_file");
   if (!folder || !output || !calibration || output->empty()) {
     return bad_field("folder, output", "folders below the station's folder");
   }

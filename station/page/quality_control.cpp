@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <exception>
 #include <map>
 #include <set>
 
@@ -57,7 +58,13 @@ Result<StationState> QualityControl::read_state() {
 
 void QualityControl::watch(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    refresh();
+    // As Lane::work(): an exception is a defect. The next refresh may succeed.
+    try {
+      refresh();
+    } catch (const std::exception& defect) {
+      show_problem("a defect of the program ended the look into the store: " +
+                   printable(defect.what()));
+    }
     std::unique_lock lock(mutex_);
     wake_.wait_for(lock, stop, kBetweenRefreshes, [&] { return refresh_asked_; });
     refresh_asked_ = false;
@@ -66,17 +73,26 @@ void QualityControl::watch(const std::stop_token& stop) {
 
 void QualityControl::refresh() {
   const auto state = read_state();
+  if (!state) {
+    return show_problem(state.error().brief());
+  }
+  Json now = state->to_json();
+  now.erase("charts");
+  now.erase("station");
+  now["problem"] = "";
+  const std::lock_guard lock(mutex_);
+  show(std::move(now));
+}
+
+// The last state stays: a store that does not answer neither locks a station nor opens it.
+void QualityControl::show_problem(const std::string& problem) {
   const std::lock_guard lock(mutex_);
   Json now = lock_;
-  if (state) {
-    now = state->to_json();
-    now.erase("charts");
-    now.erase("station");
-    now["problem"] = "";
-  } else {
-    // The last state stays: a store that does not answer neither locks a station nor opens it.
-    now["problem"] = state.error().brief();
-  }
+  now["problem"] = problem;
+  show(std::move(now));
+}
+
+void QualityControl::show(Json now) {
   if (now != lock_) {
     lock_ = std::move(now);
     ++changes_;

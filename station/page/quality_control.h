@@ -72,6 +72,8 @@ class QualityControl {
   Result<StationState> read_state();
   void watch(const std::stop_token& stop);
   void refresh();
+  void show_problem(const std::string& problem);
+  void show(nlohmann::ordered_json now);  // under the mutex
 
   const StoreOpener open_store_;
   const std::string station_;

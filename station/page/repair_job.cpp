@@ -1,6 +1,7 @@
 #include "station/page/repair_job.h"
 
 #include <atomic>
+#include <exception>
 #include <mutex>
 #include <thread>
 
@@ -215,7 +216,12 @@ Status RepairJob::start(const RepairOrder& order) {
   impl_->begin(job.files.size());
   const std::lock_guard lock(impl_->mutex);
   impl_->thread = std::jthread([this, job = std::move(job)](const std::stop_token& stop) mutable {
-    impl_->work(stop, std::move(job));
+    // As Lane::work(): an exception is a defect, and ends this job alone.
+    try {
+      impl_->work(stop, std::move(job));
+    } catch (const std::exception& defect) {
+      impl_->end("failed", "a defect of the program ended the repair: " + printable(defect.what()));
+    }
   });
   return {};
 }

@@ -166,12 +166,8 @@ nlohmann::ordered_json JigReport::to_json() const {
   }
   json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
   json["refusals"] = refusals;
-  json["stream"] = {{"samples", stream.samples},
-                    {"lost_samples", stream.lost_samples},
-                    {"duplicate_reports", stream.duplicate_reports},
-                    {"damaged_reports", stream.damaged_reports},
-                    {"failed_transfers", stream.failed_transfers},
-                    {"clock_jumps", stream.clock_jumps}};
+  device::for_each_count(
+      [&](const char* name, auto member) { json["stream"][name] = stream.*member; });
   return json;
 }
 

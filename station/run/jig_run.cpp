@@ -18,9 +18,9 @@ constexpr std::array<std::string_view, 4> kStillness = {"moving", "settling", "d
 constexpr std::array<std::string_view, 7> kOutcomes = {"running",           "complete", "timed_out",
                                                        "too_many_refusals", "stopped",  "unit_gone",
                                                        "sensor_stuck"};
-// The run ends after this many times refusals_in_row in all.
 // The run's own judgement comes first (jig_session.cpp): a unit that failed is not written.
 constexpr const char* kWriting = "the constants are judged, and written if the unit passed";
+// The run ends after this many times refusals_in_row in all.
 constexpr int kMostRefusals = 5;
 // The unit was turned although the turn itself was not in the samples.
 constexpr double kTurned_mg = 300;

@@ -192,6 +192,7 @@ const scenarios = {
     check(/2020-01-01: nothing is measured until .*--jig-exception/.test(await footer(refused)), await footer(refused));
     await start(refused);
     await refused.locator('.result .verdict', { hasText: 'NOT MEASURED' }).waitFor();
+    check((await prompt(refused)) === 'Not measured: read why below', `no unit is done: ${await prompt(refused)}`);
     await unsigned.end();
 
     const station = await h.station(['virtual:seed=7,pace=10', 'virtual:seed=8,jig=auto'],
@@ -206,6 +207,7 @@ const scenarios = {
     await button(page, 'Stop this run').click();
     await button(page, 'Yes, stop').click();
     await page.locator('.result .verdict', { hasText: 'STOPPED - WRITTEN, NOT CHECKED' }).waitFor();
+    check((await prompt(page)) === 'Stopped: not measured to its end', await prompt(page));
     await page.getByText('The unit now holds the new constants, and they were not checked.').waitFor();
     await h.shot(page, 'words-1-written');
     // Too many placements that are refused: what to do is what the station says, and no other time to wait.
@@ -216,6 +218,7 @@ const scenarios = {
       await new Promise((resolve) => setTimeout(resolve, 350));
     }
     await page.locator('.result .verdict', { hasText: 'NO VERDICT' }).waitFor();
+    check((await prompt(page)) === 'No verdict: read why below', await prompt(page));
     const said = await page.locator('.result').innerText();
     check(/written below/.test(said) && /What to do: Look at jig, seat and cable/.test(said) && !/minutes/.test(said), said);
     // The expanded uncertainty has the factor of the limits file.
@@ -499,6 +502,14 @@ const scenarios = {
     await button(page, 'Start recording').click();
     await page.getByText('install a firmware from 1.4.0 to 1.7.0').first().waitFor();
     await h.shot(page, 'files-5-refused');
+    // The lane says so, too.
+    await button(page, 'Jig').click();
+    const ended = async (lane, words) => {
+      await page.locator('.cards').getByRole('button', { name: lane }).click();
+      await until(words, async () => (await prompt(page)) === words);
+    };
+    await ended(/^2/, 'No calibration file was made');
+    await ended(/^1/, 'The calibration file is done');
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 

@@ -232,6 +232,41 @@ TEST(ScenarioJson, AProtocolIsReadAsABundleHasIt) {
   EXPECT_EQ(run.effects[0].values.at("mg_per_h"), (std::vector<double>{1, 2, 3}));
 }
 
+// A bundle that 'simulate' makes is one that 'gap diagnose' takes: the limits are those of
+// gap/recording/protocol.cpp. The last value that is taken beside the first that is not.
+TEST(ScenarioJson, AProtocolHasTheLimitsOfABundle) {
+  const auto with = [](const std::string& segment, const std::string& top = "") {
+    return parse_scenario(
+        fmt::format(R"({{"protocol": [{{"first_sample": 0, "samples": 10{}}}]{}}})", segment, top));
+  };
+  for (const char* gravity_g : {"0.99", "1.01"}) {
+    EXPECT_OK(with("", fmt::format(R"(, "gravity_g": {})", gravity_g)));
+  }
+  for (const char* gravity_g : {"0.989", "1.011", "0", "9.81"}) {
+    EXPECT_FAILS(with("", fmt::format(R"(, "gravity_g": {})", gravity_g)),
+                 ErrorCode::configuration);
+  }
+  EXPECT_OK(
+      parse_scenario(R"({"gravity_g": 9.8, "motions": [{"kind": "still", "duration_s": 2}]})"))
+      << "no protocol, no bundle";
+  EXPECT_OK(with(R"(, "temperature_c": [-100, 200])"));
+  EXPECT_FAILS(with(R"(, "temperature_c": -101)"), ErrorCode::configuration);
+  EXPECT_FAILS(with(R"(, "temperature_c": [20, 201])"), ErrorCode::configuration);
+  EXPECT_OK(with(R"(, "kind": "vibration", "vibration": {"frequency_hz": 0.001})"));
+  EXPECT_FAILS(with(R"(, "kind": "vibration", "vibration": {"frequency_hz": 0})"),
+               ErrorCode::configuration);
+  EXPECT_FAILS(with(R"(, "kind": "vibration")"), ErrorCode::configuration);
+  const auto of_segments = [](int count) {
+    std::string list;
+    for (int i = 0; i < count; ++i) {
+      list += fmt::format(R"({}{{"first_sample": {}, "samples": 10}})", i == 0 ? "" : ",", 10 * i);
+    }
+    return parse_scenario("{\"protocol\": [" + list + "]}");
+  };
+  EXPECT_OK(of_segments(1000));
+  EXPECT_FAILS(of_segments(1001), ErrorCode::configuration);
+}
+
 // Oracle: docs/scenario.md: a gain of 2 % and an offset of 35 mg, noise within 5 %. Over 300 seeds
 // the root mean squares are known to 5 % or so; the draws are cut at 2.5 standard deviations.
 TEST(ScenarioJson, AProtocolsUnitIsDrawnAsTheManualSays) {

@@ -69,11 +69,22 @@ export const EN = {
       case 'capturing': return lane.capture?.side
         ? (lane.capture.placed ? `Let it lie still: ${faceName(lane.capture.side)} side up` : `Lay it down: ${faceName(lane.capture.side)} side up`)
         : 'Recording';
-      case 'done': return lane.result?.kind === 'capture' ? 'The calibration file is done' : 'This unit is done';
+      case 'done': return EN.donePrompt(lane.result);
       case 'running':
         if (lane.run?.phase === 'writing') return 'Writing the constants: do not unplug';
         if (!lane.run?.wanted) return 'Working …';
         return `${lane.run.phase === 'reseating' ? 'Lift it off, put it back: ' : ''}${faceName(lane.run.wanted)} side up`;
+    }
+  },
+  donePrompt: (r: Result | null): string => {
+    if (r?.kind === 'capture') {
+      return r.verdict === 'pass' ? 'The calibration file is done' : r.file ? 'The calibration file cannot be used' : 'No calibration file was made';
+    }
+    switch (r?.verdict) {
+      case 'refused': return 'Not measured: read why below';
+      case 'inconclusive': return 'No verdict: read why below';
+      case 'stopped': return 'Stopped: not measured to its end';
+      default: return 'This unit is done';
     }
   },
   phase: {

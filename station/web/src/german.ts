@@ -34,6 +34,17 @@ const pane = (r: Result): { word: string; act: string } => {
     default: return { word: 'NICHT GEMESSEN', act: 'Der Grund steht unten.' };
   }
 };
+const donePrompt = (r: Result | null): string => {
+  if (r?.kind === 'capture') {
+    return r.verdict === 'pass' ? 'Die Kalibrierdatei ist fertig' : r.file ? 'Die Kalibrierdatei ist nicht brauchbar' : 'Es entstand keine Kalibrierdatei';
+  }
+  switch (r?.verdict) {
+    case 'refused': return 'Nicht gemessen: Der Grund steht unten';
+    case 'inconclusive': return 'Kein Urteil: Der Grund steht unten';
+    case 'stopped': return 'Angehalten: nicht bis zum Ende gemessen';
+    default: return 'Dieses Gerät ist fertig';
+  }
+};
 
 export const DE: Strings = {
   title: 'Sixpoint-Messplatz',
@@ -94,13 +105,14 @@ export const DE: Strings = {
       case 'capturing': return lane.capture?.side
         ? (lane.capture.placed ? `Liegen lassen: ${faceName(lane.capture.side)} oben` : `Hinlegen: ${faceName(lane.capture.side)} oben`)
         : 'Aufzeichnung';
-      case 'done': return lane.result?.kind === 'capture' ? 'Die Kalibrierdatei ist fertig' : 'Dieses Gerät ist fertig';
+      case 'done': return donePrompt(lane.result);
       case 'running':
         if (lane.run?.phase === 'writing') return 'Konstanten werden geschrieben: nicht abziehen';
         if (!lane.run?.wanted) return 'In Arbeit …';
         return `${lane.run.phase === 'reseating' ? 'Abheben, wieder auflegen: ' : ''}Seite ${faceName(lane.run.wanted)} nach oben`;
     }
   },
+  donePrompt,
   phase: {
     measuring: 'Erste Runde: jede der sechs Seiten',
     verifying: 'Zweite Runde: jede Seite, von einer anderen aus als zuvor',

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
@@ -143,6 +144,32 @@ TEST(DriveUnit, ALogThatChangesWhileItIsReadIsThrownAway) {
   EXPECT_FAILS(changed, ErrorCode::bad_data);
   EXPECT_EQ(changed.error().what, "log.bin changed while it was read");
   EXPECT_FALSE(bench.memory.files.info("s.gt3x"));
+}
+
+// A disk on which no file gets its final name.
+class NoNames final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status rename(const std::string& /*from*/, const std::string& to) override { return named(to); }
+  Status rename_new(const std::string& /*from*/, const std::string& to) override {
+    return named(to);
+  }
+
+ private:
+  static Status named(const std::string& to) {
+    return fail(ErrorCode::cannot_create, "the file has its name", to, "check it before");
+  }
+};
+
+// A program that is killed behind the check leaves no wrong recording under its name.
+TEST(DriveUnit, ARecordingIsCheckedBeforeItHasItsName) {
+  DriveBench bench;
+  const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
+  RecordingInfo listed = unit->recordings()->front();
+  NoNames files(bench.memory.files);
+  EXPECT_FAILS(unit->download(listed, files, "r.gt3x"), ErrorCode::cannot_create);
+  listed.sha256[0] ^= 1U;
+  EXPECT_FAILS(unit->download(listed, files, "r.gt3x"), ErrorCode::bad_data);
 }
 
 // Oracle: unit.h, reconnect().

@@ -56,7 +56,7 @@ TEST(Protocol, RoundTrips) {
   EXPECT_LE(samples.payload.size(), kPayloadBytes);
   EXPECT_EQ(*decode_samples(*decode(encode(samples))), block);
 
-  RecordingEntry entry{3, {2, 1ULL << 35U, 1'400'000'000, {}}};
+  RecordingEntry entry{4096, {2, 1ULL << 32U, 1'400'000'000, {}}};  // the most there may be
   entry.info.sha256.fill(9);
   EXPECT_LE(encode_recording(entry).size(), kPayloadBytes);
   EXPECT_EQ(decode_recording(encode_recording(entry))->info, entry.info);
@@ -142,6 +142,9 @@ TEST(Protocol, WellFormedNonsenseIsRefused) {
   EXPECT_FAILS(decode_filter(Bytes{0}), ErrorCode::bad_data);
   EXPECT_FAILS(decode_recording(Bytes{1, 0, 5}), ErrorCode::bad_data);
   EXPECT_FAILS(decode_recording(Bytes{}), ErrorCode::bad_data);
+  EXPECT_FAILS(decode_recording(encode_recording({4097, {}})), ErrorCode::bad_data);
+  EXPECT_FAILS(decode_recording(encode_recording({1, {1, (1ULL << 32U) + 1, 0, {}}})),
+               ErrorCode::bad_data);
 
   SampleBlock block;
   block.counts.assign(2, RawCounts{});

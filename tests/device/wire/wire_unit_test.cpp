@@ -435,6 +435,33 @@ TEST(WireUnit, AListThatChangesWhileItIsReadIsRefused) {
   EXPECT_EQ(unit->recordings()->size(), 2U);
 }
 
+// docs/protocol.md: 4096 recordings of 4 GiB at most. A unit that says more is asked no more.
+TEST(WireUnit, AListWithoutEndAndARecordingWithoutEndAreRefused) {
+  struct Row {
+    std::size_t at;  // in the payload
+    std::uint8_t value;
+    const char* what;
+  };
+  for (const Row& row :
+       {Row{1, 0xFF, "a list of 65281 recordings"}, Row{9, 0x01, "a recording of 1099511"}}) {
+    Bench bench;
+    int asked = 0;
+    const auto unit = *WireUnit::open(changed(bench.link(), {}, [&](Message& reply) {
+      if (reply.command == Command::list_recording) {
+        reply.payload[row.at] = row.value;
+        ++asked;
+      }
+    }));
+    ASSERT_OK(unit->start_recording(100, from_unix_seconds(1'500'000'000)));
+    bench.clock->sleep(std::chrono::seconds(10));
+    ASSERT_OK(unit->stop_recording());
+    const auto list = unit->recordings();
+    EXPECT_FAILS(list, ErrorCode::bad_data);
+    EXPECT_THAT(list.error().what, HasSubstr(row.what));
+    EXPECT_EQ(asked, 1);
+  }
+}
+
 // docs/protocol.md: 0 at the first IDENTIFY, then 1, 2, 3 ... 65535, 1 ...
 TEST(WireUnit, After65535RequestsTheSequenceIs1Again) {
   Bench bench;

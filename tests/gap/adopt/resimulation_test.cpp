@@ -109,5 +109,35 @@ TEST(Resimulation, AFilterMismatchCountsWithGainAndOffsets) {
   EXPECT_LT(learnt->by_size_mg, 20) << "offsets of the unit itself";
 }
 
+// The temperatures of a run before the host's zero are simulated, too. Oracle: the same run later.
+TEST(Resimulation, TheHostsClockMayBeginAnywhere) {
+  Bundle later = tests::made_production({.seed = 5});
+  for (int second = 0; second < 400; ++second) {
+    later.temperature.host_time_s.push_back(second);
+    later.temperature.temperature_c.push_back(20 + 0.05 * second);
+  }
+  Bundle earlier = later;
+  constexpr double kEarlier_s = 10'000;
+  for (Segment& segment : earlier.segments) {
+    segment.host_start_s -= kEarlier_s;
+  }
+  for (double& time_s : earlier.temperature.host_time_s) {
+    time_s -= kEarlier_s;
+  }
+  for (double& time_s : earlier.host_clock.host_time_s) {
+    time_s -= kEarlier_s;
+  }
+  const auto gap_of = [](const Bundle& bundle) {
+    const auto made = recorded_bundle(bundle, {});
+    EXPECT_OK(made);
+    const auto gap = gap_with(*made, one("offset_tempco", {{"mg_per_c", {1, 1, 1}}}));
+    EXPECT_OK(gap);
+    return gap->gap_mg;
+  };
+  const double gap_mg = gap_of(later);
+  EXPECT_GT(gap_mg, 1);
+  EXPECT_NEAR(gap_of(earlier), gap_mg, 0.01 * gap_mg);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

@@ -194,6 +194,12 @@ TEST(Protocol, LimitsAreWhereTheyAreSaidToBe) {
   const auto folded = with("/segments/1/vibration/frequency_hz", 50);
   ASSERT_OK(folded) << "a shaker runs through its tones whatever the unit's rate is";
   EXPECT_EQ(folded->losses.size(), 1U);
+  constexpr double k400Days_s = 400 * 86'400;  // the second segment lasts 10 s
+  EXPECT_OK(with("/segments/1/host_start_s", k400Days_s - 10));
+  EXPECT_FAILS(with("/segments/1/host_start_s", k400Days_s - 9), ErrorCode::bad_data);
+  EXPECT_FAILS(with("/segments/0/host_start_s", 20 - k400Days_s), ErrorCode::bad_data);
+  EXPECT_OK(read(protocol({segment(9.9e8, kUp), segment(9.9e8 + 20, kUp)})));
+  EXPECT_OK(read(protocol({segment(-9.9e8, kUp), segment(-9.9e8 + 20, kUp)})));
   EXPECT_OK(with("/gravity_g", 0.9956));  // the least and the most on Earth
   EXPECT_OK(with("/gravity_g", 1.0028));
   EXPECT_FAILS(with("/gravity_g", 0.98), ErrorCode::bad_data);

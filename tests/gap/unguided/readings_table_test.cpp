@@ -3,6 +3,8 @@
 #include <string>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <zlib.h>
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
@@ -45,6 +47,47 @@ TEST(ReadingsTable, BadTablesAreNamed) {
   EXPECT_THAT(message("5,1,2,3\n5,1,2,3\n5,1,2,3\n"), HasSubstr("rate"));  // or stands
   EXPECT_THAT(message("1,2,3\n1,2,3\n"), HasSubstr("rate must be given"));
   EXPECT_THAT(message(std::string("\x1F\x8B\x08 broken", 10)), HasSubstr("gzip"));
+}
+
+std::string gzipped(const std::string& text) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 1, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  Bytes in(text.begin(), text.end());
+  Bytes out(deflateBound(&stream, static_cast<uLong>(in.size())));
+  stream.next_in = in.data();
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = out.data();
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  const std::string packed(out.begin(),
+                           out.begin() + static_cast<std::ptrdiff_t>(stream.total_out));
+  deflateEnd(&stream);
+  return packed;
+}
+
+// RFC 1952, 2.2: bgzip cuts a file into members of 64 kB, 'cat a.gz b.gz' joins two. Oracle: the
+// same table in one piece.
+TEST(ReadingsTable, EveryMemberOfAGzipIsRead) {
+  const std::string text = table_of({}, 1);
+  const auto whole = diagnosed_table(text);
+  ASSERT_OK(whole);
+  const auto json_of = [](const std::string& packed) {
+    const auto diagnosis = diagnosed_table(packed);
+    EXPECT_OK(diagnosis);
+    return diagnosis ? diagnosis->to_json() : nlohmann::ordered_json();
+  };
+  std::string members;
+  constexpr std::size_t kPiece = 65'280;  // cuts lines, too
+  for (std::size_t at = 0; at < text.size(); at += kPiece) {
+    members += gzipped(text.substr(at, kPiece));
+  }
+  members += gzipped("");  // as bgzip ends a file
+  EXPECT_EQ(json_of(members), whole->to_json());
+  EXPECT_EQ(json_of(members + std::string(100'000, '\0')), whole->to_json());
+  for (const std::string& behind :
+       {std::string("x"), std::string("\0x", 2), members.substr(0, 9), std::string("\x1F\x8B")}) {
+    EXPECT_FAILS(diagnosed_table(members + behind), ErrorCode::bad_data);
+  }
 }
 
 TEST(ReadingsTable, ACutGzipIsAnError) {

@@ -8,6 +8,7 @@
 
 #include "device/wire/protocol.h"
 #include "mocks/firmware/virtual_unit.h"
+#include "sim/recording.h"
 
 namespace sixpoint::mocks {
 namespace {
@@ -124,6 +125,20 @@ TEST(VirtualUnitCommands, IdentifyHasTheFieldsOfThePage) {
   put("1.5.0", 12);
   put("wGT3XBT", 12);
   EXPECT_EQ(asked.ask(kIdentify), (Reply{0, expected}));
+}
+
+// Real units of the family call themselves "Link" in info.txt.
+TEST(VirtualUnitCommands, ALinkIsCalledTheSameOnTheWireAndInInfo) {
+  sim::GivenProperties given;
+  given.serial = "TAS1H30182785";
+  VirtualUnitOptions options;
+  options.truth = sim::draw_unit(7, given);
+  VirtualUnit unit(options);
+  unit.take_report(report_of(1, 1, kIdentify, {}), nanoseconds(0));
+  const auto answer = unit.next_report(nanoseconds(0));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(answer->data()) + 8 + 36), "Link");
+  EXPECT_EQ(sim::recording_info(options.truth, {}, {}, 30, 4000).device_type(), "Link");
 }
 
 // The table of codes: what each command is refused with.
@@ -349,6 +364,35 @@ TEST(VirtualUnitCommands, AClockThatJumpsBackBelowZeroRunsOnFromZero) {
   EXPECT_EQ(time_of(asked).first, 12'500'000U) << "forth as far as it says";
   asked.unit.jump_clock(-std::chrono::seconds(4), asked.now);
   EXPECT_EQ(time_of(asked).first, 8'500'000U) << "back as far as it says";
+}
+
+// A host that asks and never reads takes no memory without end; what it asked last is there.
+TEST(VirtualUnitCommands, AHostThatNeverReadsGetsTheNewestReplies) {
+  Asked asked;
+  for (std::uint16_t sequence = 1; sequence <= 1000; ++sequence) {
+    asked.unit.take_report(report_of(1, sequence, kIdentify, {}), asked.now);
+    asked.unit.take_report(report_of(1, sequence, kIdentify, {}), asked.now);  // the kept reply
+    asked.unit.take_report(report_of(2, sequence, kIdentify, {}), asked.now);  // another version
+  }
+  std::size_t replies = 0;
+  std::optional<device::Report> last;
+  for (auto reply = asked.unit.next_report(asked.now); reply;
+       reply = asked.unit.next_report(asked.now)) {
+    ++replies;
+    last = reply;
+  }
+  EXPECT_EQ(replies, 64U);
+  EXPECT_EQ(last.value()[2], low(1000));
+  EXPECT_EQ(last.value()[3], high(1000));
+}
+
+// docs/protocol.md: a unit holds at most 4096 recordings.
+TEST(VirtualUnitCommands, NoRecordingBeginsWhereThereAre4096) {
+  Asked asked;
+  for (int i = 0; i < 4096; ++i) {
+    ASSERT_TRUE(asked.unit.keep_recording({1}, {}));
+  }
+  EXPECT_EQ(asked.ask(kStartRecording, kRecord).code, 6);
 }
 
 }  // namespace

@@ -84,5 +84,21 @@ TEST(VirtualHidJig, AFaultComesAtItsTurn) {
   EXPECT_FAILS(jig->go_to(device::Pose::plus_z), ErrorCode::device_unavailable);
 }
 
+TEST(VirtualHidJig, AHostThatNeverReadsGetsTheNewestReplies) {
+  VirtualHidJig jig({}, nullptr);
+  device::Message request;
+  for (request.sequence = 1; request.sequence <= 1000; ++request.sequence) {
+    jig.take_report(device::encode(request), std::chrono::nanoseconds(0));
+  }
+  std::size_t replies = 0;
+  std::optional<device::Report> last;
+  for (auto reply = jig.next_report(); reply; reply = jig.next_report()) {
+    ++replies;
+    last = reply;
+  }
+  EXPECT_EQ(replies, 64U);
+  EXPECT_EQ(device::decode(last.value())->sequence, 1000);
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks

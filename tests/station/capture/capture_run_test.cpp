@@ -322,6 +322,84 @@ TEST(CaptureRun, WhatAKilledProgramFetchedAnewIsRemovedByTheNextOne) {
   EXPECT_GT(left_over, 5U) << "the program was killed while there was something";
 }
 
+// A capture whose side `person.wrong` is asked for again; the program ends before it is laid there.
+// Where `begins_anew_at` is not 0, an earlier program had ended before that side, too. What was
+// saved.
+CaptureResume left_when_asked_again(Person& person, std::size_t begins_anew_at) {
+  std::optional<CaptureResume> last;
+  person.hooks.progress = [&](const CaptureResume& now) { last = now; };
+  const auto ask = person.hooks.ask;
+  bool leaves = begins_anew_at != 0;
+  person.hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
+    if (!person.repeated.empty() || (leaves && number == begins_anew_at)) {
+      return SideAnswer::leave;
+    }
+    return ask(side, number, of);
+  };
+  if (leaves) {
+    EXPECT_EQ(person.capture().error().code, ErrorCode::internal);
+    leaves = false;
+  }
+  const auto resume = last;
+  EXPECT_EQ(run_capture({person.bench.unit.get(), &person.lazy}, person.bench.env.env,
+                        person.options, person.hooks, resume)
+                .error()
+                .code,
+            ErrorCode::internal);
+  EXPECT_EQ(person.repeated.size(), 1U);
+  person.hooks.ask = ask;
+  person.hooks.progress = nullptr;
+  EXPECT_TRUE(last->asked_again);
+  return *last;
+}
+
+// The recording that the file or a piece of before holds is no part of the new file, because all of
+// its sides were asked for again.
+TEST(CaptureRun, WhatWasAskedForAgainBeforeARestartReplacesTheFileOfBefore) {
+  for (const bool in_pieces : {false, true}) {
+    SCOPED_TRACE(in_pieces);
+    VirtualBench bench;
+    Person person(bench);
+    person.wrong = in_pieces ? device::Pose::minus_y : device::Pose::minus_x;
+    CaptureResume left = left_when_asked_again(person, in_pieces ? 6 : 0);
+    if (!in_pieces) {
+      left.done.clear();
+    }
+    ASSERT_EQ(left.done.size(), in_pieces ? 5U : 0U);
+    const std::string before = *file_sha256(bench.env.files, "c.gt3x");
+    person.hooks.progress = [](const CaptureResume& now) {
+      EXPECT_TRUE(now.asked_again) << "a third program finds the same";
+    };
+    const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                    person.hooks, left);
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->usable()) << testing::PrintToString(report->notes);
+    EXPECT_EQ(report->pieces.size(), in_pieces ? 2U : 0U);
+    EXPECT_EQ(files_from(bench, "c-").size(), report->pieces.size());
+    EXPECT_EQ(report->file, "c.gt3x");
+    EXPECT_EQ(*file_sha256(bench.env.files, "c.gt3x"), report->file_sha256);
+    EXPECT_NE(report->file_sha256, before);
+  }
+}
+
+TEST(CaptureRun, WhoStopsAfterARestartGetsTheJudgementOfTheFileOfBefore) {
+  VirtualBench bench;
+  Person person(bench);
+  const CaptureResume left = left_when_asked_again(person, 0);
+  const std::string before = *file_sha256(bench.env.files, "c.gt3x");
+  person.hooks.ask = [](device::Pose, std::size_t, std::size_t) { return SideAnswer::stop; };
+  const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                  person.hooks, left);
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->stopped);
+  EXPECT_EQ(report->file, "c.gt3x");
+  EXPECT_EQ(report->file_sha256, before);
+  EXPECT_EQ(*file_sha256(bench.env.files, "c.gt3x"), before);
+  ASSERT_TRUE(report->solved);
+  EXPECT_THAT(report->solved->verification.missing_directions, testing::ElementsAre("-x"));
+  EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
+}
+
 class FilesThatUnplug final : public ForwardingFiles {
  public:
   FilesThatUnplug(VirtualBench& bench, std::string name)

@@ -52,5 +52,20 @@ TEST(Lanes, ALabelThatNoLaneHoldsBlocksTheStartOfWhoScannedIt) {
   EXPECT_EQ(scan("no label of ours"), 400);
 }
 
+// Browsers that were left behind do not take the place of those that are used.
+TEST(Lanes, TheScanOfAClientBehindManyOthersBlocksItsStart) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,pace=20"}, folder.path());
+  station.wait_state(1, "idle");
+  const Json label = {{"serial", "MOS2A45139999"}};
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_EQ(station.post("/api/scan", label, "c" + std::to_string(i)), 409);
+    ASSERT_EQ(station.post("/api/scan", label, "c" + std::to_string(i)), 409) << "again";
+  }
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}, "c299"), 409);
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}, "c44"), 409) << "the 256th from the end";
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}, "c0"), 202) << "the oldest are forgotten";
+}
+
 }  // namespace
 }  // namespace sixpoint::station

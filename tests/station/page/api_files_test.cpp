@@ -32,5 +32,21 @@ TEST(ApiFiles, PathsThatLeadOutOfTheFolderAreRefused) {
   EXPECT_EQ(client.Get("/api/files?path=..a")->status, 404) << "a name that begins with two dots";
 }
 
+// What the list offers can be repaired: a path may be longer than a name.
+TEST(ApiFiles, PathsOfMoreThan200BytesAreTaken) {
+  const tests::TemporaryFolder folder;
+  const std::string part(100, 'd');
+  const std::string deep = part + "/" + part + "/" + part;
+  ASSERT_OK(posix_env().files.make_folders(folder / deep));
+  std::ofstream(folder / (deep + "/a.gt3x")) << "no recording";
+  Station station({"virtual:seed=7"}, folder.path());
+  EXPECT_EQ(station.get("/api/files?path=" + deep)["files"].size(), 1U);
+  EXPECT_EQ(station.post("/api/repair", {{"folder", deep}, {"output", deep + "/out"}}), 202);
+  EXPECT_EQ(station.post("/api/repair", {{"folder", deep}, {"output", 5}}), 400);
+  EXPECT_EQ(station.post("/api/check", {{"file", deep + "/b.gt3x"}}), 404) << "not there";
+  EXPECT_EQ(station.post("/api/check", {{"file", std::string(1000, 'd')}}), 403);
+  EXPECT_EQ(station.post("/api/check", {{"file", std::string("a\0b", 3)}}), 403);
+}
+
 }  // namespace
 }  // namespace sixpoint::station

@@ -188,6 +188,19 @@ TEST(Api, IdentifiersOfClientsStaySecret) {
   EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object(), name), 409) << "and no more";
 }
 
+// The last run could be written at the address of a capture.
+TEST(Api, ACaptureWritesNoConstants) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.wait_state(1, "idle");
+  for (const char* key : {"write", "last_run"}) {
+    EXPECT_EQ(station.post("/api/capture", {{key, true}}), 400) << key;
+    EXPECT_EQ(station.post("/api/capture", {{key, 1}}), 400) << key;
+  }
+  EXPECT_EQ(station.lane(1)["state"], "idle");
+  EXPECT_EQ(station.post("/api/capture", {{"write", false}, {"operator", "Ada"}}), 202);
+}
+
 // Where the machine has operators, a name comes from a PIN and not from the request.
 TEST(Api, TheNameInARecordIsTheOneThatSignedIn) {
   const tests::TemporaryFolder folder;

@@ -1,6 +1,8 @@
 #include "station/page/quality_control.h"
 
+#include <atomic>
 #include <chrono>
+#include <stdexcept>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -73,6 +75,33 @@ TEST_F(QualityControlTest, AnEmptyStoreHasNoRunsAndNoStudies) {
   GageQuery query;
   query.study = "autumn";
   EXPECT_FAILS(quality_.gage_study(query), ErrorCode::no_input);
+}
+
+// A defect that throws ends no thread of the station. Oracle: the state of before and the next.
+TEST(QualityControlDefect, IsShownAsAProblemAndTheNextRefreshSucceeds) {
+  const tests::TemporaryFolder folder;
+  std::atomic<bool> is_defect{true};
+  QualityControl quality(
+      [&]() -> Result<db::Store> {
+        if (is_defect) {
+          throw std::runtime_error("made by the test");
+        }
+        return db::Store::open(posix_env(), folder / "s.db");
+      },
+      "bench-1", default_limits(), posix_env().clock);
+  const auto problem_is_shown = [&](bool wanted) {
+    for (int i = 0; i < 1000 && (quality.lock()["problem"] != "") != wanted; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return (quality.lock()["problem"] != "") == wanted;
+  };
+  ASSERT_TRUE(problem_is_shown(true));
+  EXPECT_EQ(quality.lock()["problem"],
+            "a defect of the program ended the look into the store: made by the test");
+  EXPECT_EQ(quality.lock()["locked"], false);
+  is_defect = false;
+  quality.refresh_soon();
+  EXPECT_TRUE(problem_is_shown(false));
 }
 
 }  // namespace

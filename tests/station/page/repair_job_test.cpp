@@ -1,5 +1,6 @@
 #include "station/page/repair_job.h"
 
+#include <stdexcept>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -71,6 +72,29 @@ class Machine {
   MemoryEnv memory;
   sixpoint::tests::TemporaryFolder folder;
 };
+
+// A defect that throws ends the job alone, and the next one begins.
+TEST(RepairJobTest, ADefectEndsTheJobAndNotTheProgram) {
+  Machine page;
+  bool is_defect = true;
+  RepairJob job(page.memory.env, [&]() -> Result<db::Store> {
+    if (is_defect) {
+      throw std::runtime_error("made by the test");
+    }
+    return page.open();
+  });
+  const auto state_at_the_end = [&] {
+    EXPECT_OK(job.start({"archive", "out", ""}));
+    while (job.to_json()["state"] == "running") {
+      std::this_thread::yield();
+    }
+    return job.to_json()["state"];
+  };
+  EXPECT_EQ(state_at_the_end(), "failed");
+  EXPECT_EQ(job.to_json()["error"], "a defect of the program ended the repair: made by the test");
+  is_defect = false;
+  EXPECT_EQ(state_at_the_end(), "done");
+}
 
 TEST(RepairJobTest, TheStoreGetsTheRowsOfTheCommand) {
   Machine page;

@@ -72,6 +72,14 @@ TEST(JigReportJson, HasTheContractsKeys) {
   for (const char* key : {"pose", "mean_lsb", "sd_lsb", "samples", "temperature_c", "tilt_deg"}) {
     EXPECT_TRUE(json["poses"][0].contains(key)) << key;
   }
+  std::vector<std::string> counts;
+  for (const auto& [key, value] : json["stream"].items()) {
+    counts.push_back(key);
+  }
+  EXPECT_EQ(counts, (std::vector<std::string>{"samples", "lost_samples", "duplicate_reports",
+                                              "damaged_reports", "overflowed_blocks",
+                                              "failed_transfers", "clock_jumps", "clock_jumped_s"}))
+      << "all that are counted";
   EXPECT_TRUE(json["verification"].contains("residual_mg"));
   EXPECT_EQ(json["verification"]["poses"].size(), 8U);
 }

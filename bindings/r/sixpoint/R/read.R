@@ -9,12 +9,14 @@ read_gt3x_sixpoint <- function(path, verbose = FALSE, asDataFrame = FALSE, imput
   given <- attributes_of(said, isTRUE(imputeZeroes))
   if (isTRUE(asDataFrame)) {
     x <- .Call(C_reading_columns, reading)
+    if (is.character(x)) answer_of(list(x))
     names(x) <- c("X", "Y", "Z", "time")
     attributes(x$time) <- list(class = c("POSIXct", "POSIXt"), tzone = "GMT")
     attr(x, "row.names") <- .set_row_names(length(x$X))
     class(x) <- c("activity_df", "data.frame")
   } else {
     both <- .Call(C_reading_matrix, reading)
+    if (is.character(both)) answer_of(list(both))
     x <- both[[1]]
     times <- both[[2]]
     dimnames(x) <- list(NULL, c("X", "Y", "Z"))

@@ -68,7 +68,13 @@ static SEXP reading_close(SEXP pointer) {
   return R_NilValue;
 }
 
-/* list(matrix n x 3 in g, times in s) */
+/* What a call gave, or the text of its error. Not in an outcome(): that would hold the values, too,
+   and R would copy them where it sets an attribute. */
+static SEXP values_or_error(char* error, SEXP values) {
+  return error == NULL ? values : text_and_free(error);
+}
+
+/* list(matrix n x 3 in g, times in s), or an error */
 static SEXP reading_matrix(SEXP pointer) {
   sixpoint_reading* reading = reading_of(pointer);
   const double rows = sixpoint_reading_rows(reading);
@@ -79,23 +85,25 @@ static SEXP reading_matrix(SEXP pointer) {
   SET_VECTOR_ELT(both, 0, Rf_allocMatrix(REALSXP, (int)rows, 3));
   SET_VECTOR_ELT(both, 1, Rf_allocVector(REALSXP, (R_xlen_t)rows));
   double* values = REAL(VECTOR_ELT(both, 0));
-  sixpoint_reading_columns(reading, values, values + (R_xlen_t)rows, values + 2 * (R_xlen_t)rows,
-                           REAL(VECTOR_ELT(both, 1)));
+  char* error = sixpoint_reading_columns(reading, values, values + (R_xlen_t)rows,
+                                         values + 2 * (R_xlen_t)rows, REAL(VECTOR_ELT(both, 1)));
+  SEXP given = values_or_error(error, both);
   UNPROTECT(1);
-  return both;
+  return given;
 }
 
-/* list(X, Y, Z, times) */
+/* list(X, Y, Z, times), or an error */
 static SEXP reading_columns(SEXP pointer) {
   sixpoint_reading* reading = reading_of(pointer);
   SEXP all = PROTECT(Rf_allocVector(VECSXP, 4));
   for (int i = 0; i < 4; ++i) {
     SET_VECTOR_ELT(all, i, Rf_allocVector(REALSXP, (R_xlen_t)sixpoint_reading_rows(reading)));
   }
-  sixpoint_reading_columns(reading, REAL(VECTOR_ELT(all, 0)), REAL(VECTOR_ELT(all, 1)),
-                           REAL(VECTOR_ELT(all, 2)), REAL(VECTOR_ELT(all, 3)));
+  char* error = sixpoint_reading_columns(reading, REAL(VECTOR_ELT(all, 0)), REAL(VECTOR_ELT(all, 1)),
+                                         REAL(VECTOR_ELT(all, 2)), REAL(VECTOR_ELT(all, 3)));
+  SEXP given = values_or_error(error, all);
   UNPROTECT(1);
-  return all;
+  return given;
 }
 
 static SEXP reading_facts(SEXP pointer) {
