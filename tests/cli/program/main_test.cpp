@@ -177,9 +177,20 @@ TEST(StoppedText, FollowsTheTable) {
   EXPECT_EQ(says({"gap", "challenge", "--trials", "9", "--export", "K 1"}), again);
   EXPECT_EQ(says({"gap", "challenge", "--export=K 1", "--trials", "9"}), again);
   EXPECT_THAT(says({"gap", "challenge", "--trials", "9"}), HasSubstr("this line goes on"));
-  EXPECT_EQ(says({"export", "a b", "-o", "o"}),
-            "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
-            "  sixpoint export 'a b' -o o\n");
+  const std::string begins = "\nsixpoint: stopped; what is done stays, and this line begins again:\n";
+  EXPECT_EQ(says({"export", "a b", "-o", "o"}), begins + "  sixpoint export --force 'a b' -o o\n");
+  EXPECT_EQ(says({"export", "--output=o", "--force", "--", "a"}),
+            begins + "  sixpoint export --output=o --force -- a\n");
+  EXPECT_EQ(says({"store", "export", "--csv", "-o", "o"}),
+            begins + "  sixpoint store export --force --csv -o o\n");
+  const std::string goes_on = "\nsixpoint: stopped; what is done stays, and this line goes on:\n";
+  EXPECT_EQ(says({"store", "export", "-o", "s.jsonl"}),
+            goes_on + "  sixpoint store export -o s.jsonl\n");
+  EXPECT_EQ(says({"export", "a b", "--csv", "o"}), goes_on + "  sixpoint export 'a b' --csv o\n");
+  EXPECT_EQ(says({"repair", "-o", "o", "--", "a"}),
+            goes_on + "  sixpoint repair --resume -o o -- a\n");
+  EXPECT_EQ(says({"repair", "a", "-o", "o", "--resume"}),
+            goes_on + "  sixpoint repair a -o o --resume\n");
   EXPECT_THAT(says({"export", "a\nb"}), HasSubstr("export $'a\\x0ab'\n")) << "one line";
   EXPECT_THAT(says({}), HasSubstr("this line goes on"));
 }
@@ -218,6 +229,22 @@ TEST_F(Main, ADocumentIsWholeAlsoWhenTheProgramIsStopped) {
       EXPECT_EQ(child.wait(), line == scan ? 65 : 0) << "the signal came too late";
     }
   }
+}
+
+// A reader that has enough, such as `head -1`, takes the answer alone: the manifest is there.
+TEST_F(Main, ARepairWhoseReaderGoesLeavesItsManifest) {
+  std::filesystem::create_directory(folder_ / "study");
+  for (int i = 0; i < 2000; ++i) {
+    std::ofstream(folder_ / ("study/" + std::to_string(i) + ".gt3x")) << "no recording";
+  }
+  const std::string line = "repair " + (folder_ / "study") + " --scan -o " + (folder_ / "out");
+  // The shell's own exit code is that of the reader.
+  const std::string keep_code = "; echo $? >" + (folder_ / "code") + "; }";
+  run("--version >/dev/null; { " + std::string(SIXPOINT_PROGRAM) + " " + line + " 2>" +
+      (folder_ / "e") + keep_code + " | head -1 >/dev/null");
+  EXPECT_EQ(text("code"), "3\n") << text("e");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/manifest.csv"));
+  EXPECT_EQ(run(line + " --resume" + to("o", "e")), 65) << "the line that goes on: " << text("e");
 }
 
 // A bar is for a terminal, and a file is none.
