@@ -98,15 +98,14 @@ bool has_samples(const gt3x::Record& record) {
           record.is(gt3x::RecordType::activity3));
 }
 
-// What holds for the first samples; of records whose checksum holds.
-struct FirstParameters {
-  // The last PARAMETERS before them, or else the first behind them.
-  std::optional<gt3x::Parameters> record;
-  // The same of the records that have all nine numbers.
-  std::optional<StoredConstants> constants;
-};
+}  // namespace
 
-// `with_constants`: reads on until a record has them.
+std::optional<StoredConstants> FirstParameters::known_constants() const {
+  const bool contradicted =
+      record && !record->constants && constants && !record->agrees_with(*constants);
+  return contradicted ? std::nullopt : constants;
+}
+
 Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_constants) {
   SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
   FirstParameters found;
@@ -123,12 +122,14 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
         if (parameters->constants && !(sampled && found.constants)) {
           found.constants = parameters->constants;
+          found.constants_stand_before = !sampled;
         }
         if (found.record && !parameters->firmware) {  // a later record need not repeat it
           parameters->firmware = found.record->firmware;
         }
         if (!(sampled && found.record)) {
           found.record = *std::move(parameters);
+          found.record_stands_before = !sampled;
         }
       }
     }
@@ -136,6 +137,8 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
   }
   return found;
 }
+
+namespace {
 
 // A small entry of an .agdc file; empty where it is missing or too large.
 std::string text_of(gt3x::Recording& recording, const std::string& name) {
