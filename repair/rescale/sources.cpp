@@ -10,6 +10,7 @@
 #include "calib/application/agreement.h"
 #include "calib/application/map_to_apply.h"
 #include "db/records.h"
+#include "gt3x/forms/model.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -53,7 +54,7 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named) {
 
 std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const FileFacts& file,
                                      bool allow_prior) {
-  if (record.serial != file.serial) {
+  if (gt3x::unit_serial(record.serial) != gt3x::unit_serial(file.serial)) {
     return fmt::format("the constants belong to unit {}, not to this one",
                        printable(record.serial, 60));
   }

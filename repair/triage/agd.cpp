@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include "gt3x/forms/model.h"
+
 namespace sixpoint::repair {
 namespace {
 
@@ -52,6 +54,7 @@ Result<FileFacts> read_agd_facts(const std::string& path) {
       (query.getColumn(0).getString() == "deviceserial" ? facts.serial : facts.firmware) =
           query.getColumn(1).getString();
     }
+    facts.serial = gt3x::unit_serial(facts.serial);
     if (facts.serial.empty()) {
       return fail(ErrorCode::bad_data, "the settings name no unit", path,
                   "export the .agd again from its recording");

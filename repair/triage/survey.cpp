@@ -46,7 +46,7 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
   SIXPOINT_ASSIGN(const Bytes bytes, gt3x::read_all(*source, 1U << 20U));
   SIXPOINT_ASSIGN(auto memory, gt3x::parse_eeprom(bytes));
   const std::string serial = recording.info().serial();
-  if (!memory.serial.empty() && memory.serial != serial) {
+  if (!memory.serial.empty() && gt3x::unit_serial(memory.serial) != gt3x::unit_serial(serial)) {
     return fail(ErrorCode::bad_data,
                 fmt::format("eeprom.bin is of {}, the recording of {}",
                             printable(memory.serial, 16), printable(serial, 16)),
@@ -69,8 +69,11 @@ void add_firmware(const std::string& firmware, FileFacts& facts) {
 
 FileFacts header_facts(const gt3x::Info& info) {
   FileFacts facts;
-  facts.serial = info.serial();
-  facts.other_serial = info.other("Serial Number").value_or("");
+  facts.serial = gt3x::unit_serial(info.serial());
+  facts.other_serial = gt3x::unit_serial(info.other("Serial Number").value_or(""));
+  if (facts.other_serial == facts.serial) {
+    facts.other_serial.clear();
+  }
   facts.firmware = info.firmware();
   add_firmware(std::string(info.other("Firmware").value_or("")), facts);
   facts.recorded = info.start();
