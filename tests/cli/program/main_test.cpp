@@ -9,6 +9,9 @@
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <pty.h>
+#include <termios.h>
+#include <utmp.h>
 
 #include "base/env.h"
 #include "base/random.h"
@@ -245,6 +248,39 @@ TEST_F(Main, ARepairWhoseReaderGoesLeavesItsManifest) {
   EXPECT_EQ(text("code"), "3\n") << text("e");
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/manifest.csv"));
   EXPECT_EQ(run(line + " --resume" + to("o", "e")), 65) << "the line that goes on: " << text("e");
+}
+
+TEST_F(Main, CtrlCAtThePromptForAPinLeavesATerminalThatShowsWhatIsTyped) {
+  int program = -1;
+  int terminal = -1;
+  ASSERT_EQ(::openpty(&program, &terminal, nullptr, nullptr, nullptr), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::close(program);
+    ::login_tty(terminal);
+    ::setenv("HOME", folder_.path().c_str(), 1);
+    ::unsetenv("XDG_DATA_HOME");
+    ::execl(SIXPOINT_PROGRAM, "sixpoint", "operator", "add", "Ada", nullptr);
+    ::_exit(127);
+  }
+  const auto shows = [&] {
+    termios now{};
+    return ::tcgetattr(terminal, &now) == 0 && (now.c_lflag & ECHO) != 0;
+  };
+  EXPECT_TRUE(shows());
+  for (int hundredths = 0; hundredths < 6000 && shows(); ++hundredths) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ASSERT_FALSE(shows()) << "it asks for the PIN";
+  ASSERT_EQ(::write(program, "\x03", 1), 1);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3);
+  EXPECT_TRUE(shows());
+  ::close(program);
+  ::close(terminal);
 }
 
 // A bar is for a terminal, and a file is none.
