@@ -247,9 +247,6 @@ class ShardRun {
     if (const auto status = check_output_place(files_, options_.output_folder, output); !status) {
       return failed(input, status.error());
     }
-    if (!options_.dry_run) {
-      AtomicFile::remove_left_over(files_, output);
-    }
     RepairOptions options = plan_.repair.options;
     options.dry_run = options_.dry_run;
     options.resume = true;
