@@ -294,7 +294,7 @@ void add_export(CLI::App& app, Context& context) {
   records->excludes(raw, no_fill, fill_limit, time, unix_time);
   command.add_flag("--gzip", options.gzip, "write .csv.gz, .npy.gz");
   add_salvage_option(command, options.salvage);
-  command.add_option("--jobs", options.jobs, "threads that pack with --gzip (default: all cores)");
+  add_jobs_option(command, options.jobs, "threads that pack with --gzip (default: all cores)");
   add_output_options(command, options.outputs);
 }
 

@@ -23,7 +23,7 @@ TEST(Requests, TakeTheirOptionsAndNoOthers) {
   EXPECT_EQ(request.constants, "C.json");
   EXPECT_FALSE(request.or_scan);
   for (const char* wrong :
-       {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})",
+       {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})", R"({"jobs": 257})",
         R"({"jobs": 1.5})", R"({"link_unaffected": "none"})", R"({"link_unaffected": 1})", "[]",
         "{"}) {
     RepairRequest other;
