@@ -557,6 +557,14 @@ void cut_the_power_everywhere(FixedConstants& source, const RepairOptions& optio
   }
 }
 
+// A mark that is cut is none, and the output would be repaired once more.
+TEST_F(RepairFile, ASerialNumberThatNoMarkHoldsGivesNoOutput) {
+  MadeRecording made = six_sides();
+  made.serial = "MOS" + std::string(70'000, '0');
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  EXPECT_NE(expect_bad_data().find("mark"), std::string::npos);
+}
+
 TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
   RepairOptions options;
   cut_the_power_everywhere(source_, options);
