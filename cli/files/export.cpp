@@ -218,7 +218,7 @@ Status export_into_folder(const ExportCommandOptions& options, Outputs& outputs,
         return fail(ErrorCode::cannot_create, "another recording has the same name", file.path,
                     "export the two into separate folders");
       }
-      SIXPOINT_CHECK(outputs.files().make_folders(folder_of(csv)));
+      SIXPOINT_CHECK(make_synced_folders(outputs.files(), folder_of(csv)));
       return export_file(options, context, outputs.files(), file.path, csv);
     }();
     if (!done) {
