@@ -1,6 +1,5 @@
 #include "repair/rescale/sources.h"
 
-#include <algorithm>
 #include <array>
 
 #include <fmt/format.h>
@@ -22,13 +21,6 @@ constexpr std::array<std::string_view, 5> kSourceNames = {"constants", "calibrat
 }  // namespace
 
 std::string_view to_string(SourceKind kind) { return kSourceNames[static_cast<std::size_t>(kind)]; }
-
-std::optional<SourceKind> parse_source_kind(std::string_view text) {
-  const auto found = std::ranges::find(kSourceNames, text);
-  return found == kSourceNames.end()
-             ? std::nullopt
-             : std::optional(static_cast<SourceKind>(found - kSourceNames.begin()));
-}
 
 std::vector<SourceKind> sources_in_order(const NamedSources& named) {
   std::vector<SourceKind> order;
