@@ -245,14 +245,6 @@ Status check_calibration_recording(FileSystem& files, const std::string& path) {
   return fail(std::move(error));
 }
 
-RepairReport failed_report(const std::string& input, const Error& error) {
-  RepairReport report;
-  report.input = input;
-  report.error = error;
-  report.reasons.push_back(error.brief());
-  return report;
-}
-
 void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
                        const std::string& folder) {
   const auto output = files.real_path(folder);
