@@ -79,10 +79,10 @@ struct Context {
 
 // The exit code of a command that a signal ended (stop_request.h):
 //
-//   signal                                                  exit code
-//   SIGINT (Ctrl-C), SIGHUP (the terminal is closed)        3, as everywhere
-//   SIGTERM, the word of what supervises services           0
-//   none (-1): the command ended by itself                  0
+//     signal                                             exit code
+//     SIGINT (Ctrl-C), SIGHUP (the terminal is closed)   3, as everywhere
+//     SIGTERM, the word of what supervises services      0
+//     none (-1): the command ended by itself             0
 int exit_of_stop(int signal);
 void take_stop(Context& context, int signal);
 

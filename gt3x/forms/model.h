@@ -21,9 +21,13 @@ std::string_view model_of(std::string_view serial);
 // counts). Capitals or not: files with either are known.
 std::optional<double> default_accel_scale_lsb_per_g(std::string_view serial);
 
-// The serial number as the unit itself, its label and the store have it: in capitals where the model
-// is known and it has letters and digits alone, 16 at most. Some files have it in small letters;
-// what other makers write stays as it is.
+// The serial number as the unit itself, its label and the store have it. Some files have it in small
+// letters.
+//
+// | the file's                                              | the unit's   |
+// |---------------------------------------------------------|--------------|
+// | of a known model, letters and digits alone, 16 at most  | in capitals  |
+// | any other, such as another maker's                      | the same     |
 std::string unit_serial(std::string_view serial);
 
 }  // namespace sixpoint::gt3x
