@@ -196,7 +196,7 @@ FolderTarget look_at_folder(FileSystem& files, const std::string& path) {
     return FolderTarget::empty;
   }
   return repair::is_bundle(files, path) || repair::is_plan(files, path) ? FolderTarget::record
-                                                        : FolderTarget::filled;
+                                                                        : FolderTarget::filled;
 }
 
 namespace {

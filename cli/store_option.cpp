@@ -168,8 +168,7 @@ Json kept_to_json(const db::Saved& kept) {
 
 Status write_constants(FileSystem& files, const std::string& path,
                        const calib::ConstantsRecord& record) {
-  return path.empty() ? Status()
-                      : write_file(files, path, calib::to_json(record).dump(2) + "\n");
+  return path.empty() ? Status() : write_file(files, path, calib::to_json(record).dump(2) + "\n");
 }
 
 namespace {

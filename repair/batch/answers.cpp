@@ -15,7 +15,8 @@ Json time_or_null(std::optional<UtcTime> time) {
 }
 Json axes(const PerAxis<int>& values) { return Json{values[0], values[1], values[2]}; }
 Json axes(const PerAxis<double>& values) {
-  return Json{calib::number_or_null(values[0]), calib::number_or_null(values[1]), calib::number_or_null(values[2])};
+  return Json{calib::number_or_null(values[0]), calib::number_or_null(values[1]),
+              calib::number_or_null(values[2])};
 }
 Json time_or_null(const gt3x::Clock& clock, std::optional<std::uint32_t> unix_time) {
   return unix_time ? Json(gt3x::clock_time(clock, *unix_time)) : Json(nullptr);
@@ -57,13 +58,14 @@ Json to_json(const StoredConstants& constants) {
 
 Json to_json(const InspectedStill& still) {
   const bool any = still.magnitude.blocks > 0;
-  return {{"blocks", still.magnitude.blocks},
-          {"coverage_g",
-           {{"min", any ? axes(still.coverage.min_g) : Json(nullptr)},
-            {"max", any ? axes(still.coverage.max_g) : Json(nullptr)}}},
-          {"magnitude_mg",
-           {{"mean_error", any ? calib::number_or_null(still.magnitude.mean_mg) : Json(nullptr)},
-            {"worst_error", any ? calib::number_or_null(still.magnitude.worst_mg) : Json(nullptr)}}}};
+  return {
+      {"blocks", still.magnitude.blocks},
+      {"coverage_g",
+       {{"min", any ? axes(still.coverage.min_g) : Json(nullptr)},
+        {"max", any ? axes(still.coverage.max_g) : Json(nullptr)}}},
+      {"magnitude_mg",
+       {{"mean_error", any ? calib::number_or_null(still.magnitude.mean_mg) : Json(nullptr)},
+        {"worst_error", any ? calib::number_or_null(still.magnitude.worst_mg) : Json(nullptr)}}}};
 }
 
 Json damage_of(const gt3x::LogStatistics& log, const gt3x::Clock& clock) {
@@ -115,8 +117,7 @@ Json inspection_to_json(const Inspection& found, const std::string& path) {
   json["model"] = gt3x::model_of(found.facts.serial);
   json["device_type"] = found.device_type;
   json["sample_rate_hz"] = calib::number_or_null(found.rate_hz);
-  json["accel_scale_lsb_per_g"] =
-      calib::number_or_null(found.accel_scale_lsb_per_g);
+  json["accel_scale_lsb_per_g"] = calib::number_or_null(found.accel_scale_lsb_per_g);
   json["clock"] = to_json(found.clock);
   json["start"] = time_or_null(found.clock, found.start);
   json["first_after_start_s"] =

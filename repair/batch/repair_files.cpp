@@ -227,8 +227,9 @@ class Run {
 Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const auto bytes, read_file(files, path, 1U << 20));
   if (const auto doubled = doubled_json_key(as_text(bytes))) {
-    return fail(ErrorCode::bad_data, fmt::format("the key {} stands twice", printable(*doubled, 200)),
-                path, "remove the one that is wrong");
+    return fail(ErrorCode::bad_data,
+                fmt::format("the key {} stands twice", printable(*doubled, 200)), path,
+                "remove the one that is wrong");
   }
   auto record = calib::parse_constants_record(as_text(bytes));
   if (!record) {

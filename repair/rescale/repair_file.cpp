@@ -173,8 +173,7 @@ class Repair {
     const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
     // How large a log of wide records becomes is known at its end only, and its entry is to say it
     // before: all would be written twice.
-    if (options_.dry_run || options_.salvage || options_.wide ||
-        env_.files.link_info(output_)) {
+    if (options_.dry_run || options_.salvage || options_.wide || env_.files.link_info(output_)) {
       return another_way;
     }
     SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));

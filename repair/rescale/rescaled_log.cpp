@@ -86,10 +86,11 @@ RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options)
 Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
                                                        const RescaledLogOptions& options) {
   if (options.mark.size() > gt3x::kMaxPayload) {  // cut, it would be none: repaired once more
-    return fail(ErrorCode::bad_data,
-                fmt::format("the mark of the repair has {} bytes, a record of the log has room for {}",
-                            options.mark.size(), gt3x::kMaxPayload),
-                {}, "look at the serial number in info.txt, which the mark holds");
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("the mark of the repair has {} bytes, a record of the log has room for {}",
+                    options.mark.size(), gt3x::kMaxPayload),
+        {}, "look at the serial number in info.txt, which the mark holds");
   }
   std::unique_ptr<RescaledLog> source(new RescaledLog(std::move(log), options));
   if (options.first_constants.has_value()) {

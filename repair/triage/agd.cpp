@@ -74,9 +74,8 @@ Result<FileFacts> read_agd_facts(const std::string& path) {
       }
       return fail(ErrorCode::no_input, "cannot be opened as an .agd", path, "check the path");
     }
-    return fail(ErrorCode::bad_data,
-                fmt::format("cannot be read as an .agd: {}", exception.what()), path,
-                "export the .agd again from its recording");
+    return fail(ErrorCode::bad_data, fmt::format("cannot be read as an .agd: {}", exception.what()),
+                path, "export the .agd again from its recording");
   }
 }
 

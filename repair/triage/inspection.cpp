@@ -238,8 +238,9 @@ void add_warnings(Inspection& found, const gt3x::SampleReader& reader,
     warn("the first sample has no complete set of constants (PARAMETERS) before it");
   }
   if (first.constants && !first.known_constants()) {
-    warn("PARAMETERS have some of the nine constants only, and other ones than a complete record: "
-         "which constants the first samples were made by is not known");
+    warn(
+        "PARAMETERS have some of the nine constants only, and other ones than a complete record: "
+        "which constants the first samples were made by is not known");
   }
   if (reader.constants_changed()) {
     warn("PARAMETERS are repeated with other constants; for each sample the last before it hold");

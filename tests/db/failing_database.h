@@ -118,7 +118,7 @@ class FailingDatabase final : public Database {
   }
 
   std::unique_ptr<Database> database_ = open_sqlite_in_memory().value();
-  mutable std::mutex mutex_;         // an audit asks for the indexes on a thread of its own
+  mutable std::mutex mutex_;  // an audit asks for the indexes on a thread of its own
   bool loses_copies_ = false;
   std::optional<std::size_t> left_;  // calls before the one that fails
   bool failed_ = false;

@@ -73,8 +73,7 @@ TEST_F(RepairAnswer, AKeyThatStandsTwiceInAConstantsFileIsRefused) {
   const std::string text = tests::kConstants;
   std::ofstream(path("once.json")) << text;
   ASSERT_OK(read_constants(posix_env().files, path("once.json")));
-  std::ofstream(path("twice.json"))
-      << R"({"filter": "legacy",)" << text.substr(text.find('{') + 1);
+  std::ofstream(path("twice.json")) << R"({"filter": "legacy",)" << text.substr(text.find('{') + 1);
   const auto read = read_constants(posix_env().files, path("twice.json"));
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::bad_data);

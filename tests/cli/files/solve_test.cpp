@@ -109,8 +109,7 @@ TEST_F(SolveCommand, SixSidesAreSolvedStoredAndWritten) {
 TEST_F(SolveCommand, AFileThatCannotBeWrittenStopsNotTheStore) {
   const std::string path = write(sides_recording({0, 1, 2, 3, 4, 5}), "six.gt3x");
   const std::string store = folder_ / "s.db";
-  const auto answer =
-      run({"solve", path, "--json", "--save", "--store", store, "-o", "/dev/full"});
+  const auto answer = run({"solve", path, "--json", "--save", "--store", store, "-o", "/dev/full"});
   EXPECT_EQ(answer.exit_code, 74);
   EXPECT_THAT(answer.people, HasSubstr("/dev/full"));
   const Json stored = run({"history", "MOS2A45130450", "--json", "--store", store}).json();

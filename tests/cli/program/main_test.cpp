@@ -180,7 +180,8 @@ TEST(StoppedText, FollowsTheTable) {
   EXPECT_EQ(says({"gap", "challenge", "--trials", "9", "--export", "K 1"}), again);
   EXPECT_EQ(says({"gap", "challenge", "--export=K 1", "--trials", "9"}), again);
   EXPECT_THAT(says({"gap", "challenge", "--trials", "9"}), HasSubstr("this line goes on"));
-  const std::string begins = "\nsixpoint: stopped; what is done stays, and this line begins again:\n";
+  const std::string begins =
+      "\nsixpoint: stopped; what is done stays, and this line begins again:\n";
   EXPECT_EQ(says({"export", "a b", "-o", "o"}), begins + "  sixpoint export --force 'a b' -o o\n");
   EXPECT_EQ(says({"export", "--output=o", "--force", "--", "a"}),
             begins + "  sixpoint export --output=o --force -- a\n");

@@ -66,7 +66,7 @@ int work_without_threads() {
 }
 
 TEST(WithoutThreads, TheCallerDoesTheWork) {
-  if (tests::kSanitized) {
+  if (sixpoint::tests::kSanitized) {
     GTEST_SKIP() << "a sanitizer needs the address space that is taken away here";
   }
   EXPECT_EXIT(::_exit(work_without_threads()), testing::ExitedWithCode(0), "");

@@ -23,9 +23,9 @@ TEST(Requests, TakeTheirOptionsAndNoOthers) {
   EXPECT_EQ(request.constants, "C.json");
   EXPECT_FALSE(request.or_scan);
   for (const char* wrong :
-       {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})", R"({"jobs": 257})",
-        R"({"jobs": 1.5})", R"({"link_unaffected": "none"})", R"({"link_unaffected": 1})", "[]",
-        "{"}) {
+       {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})",
+        R"({"jobs": 257})", R"({"jobs": 1.5})", R"({"link_unaffected": "none"})",
+        R"({"link_unaffected": 1})", "[]", "{"}) {
     RepairRequest other;
     EXPECT_FAILS(take_options(wrong, other), ErrorCode::usage);
   }
@@ -164,11 +164,10 @@ TEST(Reading, NamesTheParametersThatScanInspectAndRepairName) {
   Bytes contradicted;
   add(contradicted, made_parameters(first), 1'384'000'000);
   add(contradicted, others, 1'384'266'733);
-  for (auto& [log, constants] :
-       {std::pair<Bytes&, std::optional<StoredConstants>>{behind, first},
-        {two, second},
-        {incomplete, first},
-        {contradicted, std::nullopt}}) {
+  for (auto& [log, constants] : {std::pair<Bytes&, std::optional<StoredConstants>>{behind, first},
+                                 {two, second},
+                                 {incomplete, first},
+                                 {contradicted, std::nullopt}}) {
     append_second(log, 1);
     MemoryEnv memory;
     ASSERT_OK(put_recording(memory.files, "a.gt3x", log));

@@ -561,6 +561,7 @@ void cut_the_power_everywhere(FixedConstants& source, const RepairOptions& optio
 TEST_F(RepairFile, ASerialNumberThatNoMarkHoldsGivesNoOutput) {
   MadeRecording made = six_sides();
   made.serial = "MOS" + std::string(70'000, '0');
+  source_.choice.chosen->record.serial = made.serial;
   ASSERT_OK(made.write(memory_.files, "in.gt3x"));
   EXPECT_NE(expect_bad_data().find("mark"), std::string::npos);
 }
