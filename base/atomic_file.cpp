@@ -58,9 +58,10 @@ AtomicFile::AtomicFile(AtomicFile&& other) noexcept
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr && !temporary_.empty()) {
-    file_.reset();
-    // Nothing can be done about a failure here: the name says that the file is temporary.
+    // While the lock is held: afterwards another process may have the name. Nothing can be done about
+    // a failure here: the name says that the file is temporary.
     static_cast<void>(files_->remove(temporary_));
+    file_.reset();
     forget_temporary(temporary_);
   }
 }

@@ -43,6 +43,8 @@ class AtomicFile {
   // kept in memory until commit().
   WritableFile& file();
   std::uint64_t size() const { return size_; }
+  // No other process has this name while the object lives. Empty: the bytes go through.
+  const std::string& temporary() const { return temporary_; }
   Status commit();
 
  private:

@@ -74,14 +74,6 @@ int round_half_away(double value) {
   return static_cast<int>(std::round(std::clamp(value, -kLimit, kLimit)));
 }
 
-std::int16_t firmware_count(const StoredConstants& stored, double accel_scale_lsb_per_g,
-                            std::size_t axis, int raw_lsb, RecordWidth width) {
-  const int span = stored.positive_lsb[axis] - stored.negative_lsb[axis];
-  const int count = round_half_away(
-      firmware_value(2 * accel_scale_lsb_per_g, stored.zero_lsb[axis], span, raw_lsb));
-  return static_cast<std::int16_t>(std::clamp(count, lowest_count(width), highest_count(width)));
-}
-
 Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scale_lsb_per_g,
                                 RecordWidth width) {
   SIXPOINT_CHECK(check_scale(accel_scale_lsb_per_g));
@@ -215,7 +207,7 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
   rescale.output_ = options.output;
   rescale.cross_axis_ = options.cross_axis;
   rescale.has_terms_ = options.cross_axis != PerAxis<double>{};
-  rescale.identity_ = fresh == reversal.calibration() && !rescale.has_terms_;
+  const bool is_identity = fresh == reversal.calibration() && !rescale.has_terms_;
   if (!all_finite(options.cross_axis)) {
     return fail(ErrorCode::bad_data, "a cross-axis term is not finite", "scaling",
                 "take the constants from the store or from another recording");
@@ -239,7 +231,7 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
       if (rescale.has_terms_) {
         rescale.level_[a].push_back(level);
       }
-      if (rescale.identity_) {
+      if (is_identity) {
         fresh_count = count;
       } else if (at_limit && !widens) {
         fresh_count = count == low ? out_low : out_high;

@@ -38,11 +38,6 @@ constexpr int highest_count(RecordWidth width) {
 // The nearest integer, halves away from zero; saturates at +-2^30, NaN gives 0.
 int round_half_away(double value);
 
-// The firmware's rule, forward, clipped to `width`. Exact: numerator and quotient are such that a
-// double separates every half-way case from its neighbours. `stored` must be valid.
-std::int16_t firmware_count(const StoredConstants& stored, double accel_scale_lsb_per_g,
-                            std::size_t axis, int raw_lsb, RecordWidth width);
-
 // The integers that can have led to a stored count: first .. first + number - 1.
 struct RawCandidates {
   int first = 0;
@@ -162,7 +157,6 @@ class Rescale {
   // In place allowed (in == out); the spans have the same length.
   void apply(std::span<const StoredCounts> in, std::span<StoredCounts> out,
              RescaleTally& counts) const;
-  bool changes_nothing() const { return identity_; }
 
  private:
   enum Flag : std::uint8_t { kClippedBefore = 1, kClippedAfter = 2, kAffine = 4 };
@@ -188,7 +182,6 @@ class Rescale {
 
   RecordWidth input_ = RecordWidth::bits12;
   RecordWidth output_ = RecordWidth::bits12;
-  bool identity_ = false;
   bool has_terms_ = false;
   PerAxis<double> cross_axis_{};
   PerAxis<std::vector<double>> level_;  // unrounded counts by `fresh`; with cross-axis terms only

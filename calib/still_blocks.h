@@ -110,7 +110,6 @@ class StillBlockFinder {
   // The same, handed over; the finder has none then.
   std::vector<StillBlock> take_blocks() { return std::exchange(blocks_, {}); }
   const StillBlockTally& tally() const { return tally_; }
-  int samples_per_block() const { return block_samples_; }
 
   // The regression line of one axis over a window, in counts.
   struct Line {

@@ -49,11 +49,11 @@ void Context::worsen(int code) {
 
 void Context::worsen_as_incomplete() { exit_code = std::max(exit_code, kExitInconclusive); }
 
-void take_stop(Context& context, int signal) {
-  if (signal == SIGINT || signal == SIGHUP) {
-    context.worsen(kExitStopped);
-  }
+int exit_of_stop(int signal) {
+  return signal == SIGINT || signal == SIGHUP ? kExitStopped : kExitPassed;
 }
+
+void take_stop(Context& context, int signal) { context.worsen(exit_of_stop(signal)); }
 
 Json document(std::string_view command) {
   Json json;

@@ -77,8 +77,13 @@ struct Context {
   void worsen_as_incomplete();
 };
 
-// The exit code of a command that a signal ended (stop_request.h): 3, as everywhere; 0 by SIGTERM, the word
-// of what supervises services. `signal` may be none (-1): the command ended by itself.
+// The exit code of a command that a signal ended (stop_request.h):
+//
+//     signal                                             exit code
+//     SIGINT (Ctrl-C), SIGHUP (the terminal is closed)   3, as everywhere
+//     SIGTERM, the word of what supervises services      0
+//     none (-1): the command ended by itself             0
+int exit_of_stop(int signal);
 void take_stop(Context& context, int signal);
 
 // {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.

@@ -12,6 +12,7 @@
 
 #include "base/atomic_file.h"
 #include "base/forwarding_files.h"
+#include "repair/archive/output_lock.h"
 
 namespace sixpoint::cli {
 
@@ -52,19 +53,6 @@ bool same_file(const FileInfo& a, const FileInfo& b) {
   return a.inode != 0 && a.inode == b.inode && a.device == b.device;
 }
 
-// Up to 4 KiB from its beginning; nothing where it cannot be read.
-std::string beginning_of(FileSystem& files, const std::string& path) {
-  constexpr std::size_t kEnough = 4096;
-  const auto file = files.open(path);
-  std::string text(kEnough, '\0');
-  const auto count =
-      file ? (*file)->read_at(0,
-                              std::span(reinterpret_cast<std::uint8_t*>(text.data()), text.size()))
-           : Result<std::size_t>(0);
-  text.resize(count.value_or(0));
-  return text;
-}
-
 bool is_database(std::string_view beginning) {
   return beginning.starts_with(std::string_view("SQLite format 3\0", 16));
 }
@@ -85,14 +73,6 @@ bool has_schema(std::string_view beginning, std::string_view name) {
          beginning.find(fmt::format("\"sixpoint/{}/", name)) != std::string_view::npos;
 }
 
-bool is_bundle(FileSystem& files, const std::string& folder) {
-  return has_schema(beginning_of(files, folder + "/protocol.json"), "bundle");
-}
-
-bool is_plan(FileSystem& files, const std::string& folder) {
-  return has_schema(beginning_of(files, folder + "/plan.json"), "archive-plan");
-}
-
 bool belongs_to_record(FileSystem& files, const std::string& path, std::string_view beginning) {
   constexpr std::array<std::string_view, 5> kRecords = {"bundle", "archive-plan", "archive-output",
                                                         "session-journal", "journal-entry"};
@@ -101,8 +81,8 @@ bool belongs_to_record(FileSystem& files, const std::string& path, std::string_v
   return std::any_of(kRecords.begin(), kRecords.end(),
                      [&](std::string_view name) { return has_schema(beginning, name); }) ||
          (std::find(kOfBundle.begin(), kOfBundle.end(), file_name_of(path)) != kOfBundle.end() &&
-          is_bundle(files, folder)) ||
-         is_plan(files, folder) || is_plan(files, folder + "/..");
+          repair::is_bundle(files, folder)) ||
+         repair::is_plan(files, folder) || repair::is_plan(files, folder + "/..");
 }
 
 // Of a regular file that is no input; `named` may be a link to it.
@@ -215,8 +195,8 @@ FolderTarget look_at_folder(FileSystem& files, const std::string& path) {
   if (names && names->empty()) {
     return FolderTarget::empty;
   }
-  return is_bundle(files, path) || is_plan(files, path) ? FolderTarget::record
-                                                        : FolderTarget::filled;
+  return repair::is_bundle(files, path) || repair::is_plan(files, path) ? FolderTarget::record
+                                                                        : FolderTarget::filled;
 }
 
 namespace {

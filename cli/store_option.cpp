@@ -166,19 +166,16 @@ Json kept_to_json(const db::Saved& kept) {
           {"error", kept.refusal ? error_to_json(*kept.refusal) : Json(nullptr)}};
 }
 
-Result<calib::ConstantsRecord> record_constants(const Env& env, const calib::SolveReport& solved,
-                                                const calib::ConstantsOrigin& origin,
-                                                const std::string& path) {
-  SIXPOINT_ASSIGN(auto record, calib::record_of(solved, env.clock.now(), origin));
-  if (!path.empty()) {
-    SIXPOINT_CHECK(write_file(env.files, path, calib::to_json(record).dump(2) + "\n"));
-  }
-  return record;
+Status write_constants(FileSystem& files, const std::string& path,
+                       const calib::ConstantsRecord& record) {
+  return path.empty() ? Status() : write_file(files, path, calib::to_json(record).dump(2) + "\n");
 }
 
-Result<SavedConstants> save_constants(Context& context, const std::string& location,
-                                      const calib::ConstantsRecord& record,
-                                      const std::string& model) {
+namespace {
+
+Result<SavedConstants> save_in_store(Context& context, const std::string& location,
+                                     const calib::ConstantsRecord& record,
+                                     const std::string& model) {
   auto store = open_store(context, location);
   SavedConstants done;
   SIXPOINT_ASSIGN(
@@ -196,14 +193,28 @@ Result<SavedConstants> save_constants(Context& context, const std::string& locat
   return done;
 }
 
+}  // namespace
+
+Result<SavedConstants> save_constants(Context& context, FileSystem& files,
+                                      const std::string& location,
+                                      const calib::ConstantsRecord& record,
+                                      const std::string& model, const std::string& path) {
+  auto saved = save_in_store(context, location, record, model);
+  if (const Status written = write_constants(files, path, record); !written) {
+    report_error(context, written.error());
+  }
+  return saved;
+}
+
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     const station::CaptureReport& report, const std::string& path) {
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
   origin.file = db::storable_path(file_name_of(report.file));
   origin.kind = "calibration_file";
-  SIXPOINT_ASSIGN(const auto record, record_constants(env, *report.solved, origin, path));
-  return save_constants(context, location, record, std::string(gt3x::model_of(record.serial)));
+  SIXPOINT_ASSIGN(const auto record, calib::record_of(*report.solved, env.clock.now(), origin));
+  return save_constants(context, env.files, location, record,
+                        std::string(gt3x::model_of(record.serial)), path);
 }
 
 CLI::Option* add_store_option(CLI::App& command, std::string& location) {

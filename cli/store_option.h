@@ -84,20 +84,22 @@ std::string kept_as(const db::Saved& kept, const std::string& id);
 // {"in": "store" | "journal", "folder", "error"}
 Json kept_to_json(const db::Saved& kept);
 
-// Constants that were solved just now, as a record; also written to the file `path` (none: empty).
-Result<calib::ConstantsRecord> record_constants(const Env& env, const calib::SolveReport& solved,
-                                                const calib::ConstantsOrigin& origin,
-                                                const std::string& path);
+// Constants as a file (empty: none).
+Status write_constants(FileSystem& files, const std::string& path,
+                       const calib::ConstantsRecord& record);
 
 // A set of constants that is in the store or in the journal.
 struct SavedConstants {
   std::string id;
   db::Saved place;
 };
-Result<SavedConstants> save_constants(Context& context, const std::string& location,
+// Also written to the file `path` of `files`. Neither stops the other: what is wrong with the file
+// is reported (report_error), and the answer is about the store.
+Result<SavedConstants> save_constants(Context& context, FileSystem& files,
+                                      const std::string& location,
                                       const calib::ConstantsRecord& record,
-                                      const std::string& model);
-// Those of a calibration file that was made just now; also written to the file `path` of `env`.
+                                      const std::string& model, const std::string& path);
+// The same with those of a calibration file that was made just now, and the files of `env`.
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     const station::CaptureReport& report, const std::string& path);
 

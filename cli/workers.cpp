@@ -16,8 +16,8 @@ std::vector<NamedFile> named_files(Context& context, const std::vector<std::stri
   return std::move(named.files);
 }
 
-void add_jobs_option(CLI::App& command, unsigned& jobs) {
-  command.add_option("--jobs", jobs, "files at a time (default: one per core)");
+void add_jobs_option(CLI::App& command, unsigned& jobs, const std::string& about) {
+  command.add_option("--jobs", jobs, about)->check(CLI::Range(0U, repair::kMostJobs));
 }
 
 }  // namespace sixpoint::cli

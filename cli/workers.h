@@ -29,8 +29,9 @@ using repair::threads_of;
 std::vector<NamedFile> named_files(Context& context, const std::vector<std::string>& paths,
                                    const std::vector<std::string>& endings);
 
-// --jobs N
-void add_jobs_option(CLI::App& command, unsigned& jobs);
+// --jobs N: 0 (one per core) to repair::kMostJobs. `about`: what there are so many of.
+void add_jobs_option(CLI::App& command, unsigned& jobs,
+                     const std::string& about = "files at a time (default: one per core)");
 
 // The answers of `work(file)`, which runs on up to `jobs` threads; `doing` names the progress bar.
 template <class Answer, class Work>

@@ -11,11 +11,14 @@
 namespace sixpoint::db {
 namespace {
 
-// Makes `path` a store that `fill` filled, whole or not at all: under another name first.
+// Makes `path` a store that `fill` filled, whole or not at all: under another name first, which no
+// other process has, since it has the name and the lock of an AtomicFile before it. That lock is no
+// lock of the store itself: over NFS, SQLite could not take its own then.
 Result<ExchangeReport> make_store_file(
     Env& env, const std::string& path,
     const std::function<Result<ExchangeReport>(const std::string& temporary)>& fill) {
-  const std::string temporary = fmt::format("{}/.{}.tmp", folder_of(path), file_name_of(path));
+  SIXPOINT_ASSIGN(const AtomicFile locked, AtomicFile::create(env.files, path));
+  const std::string temporary = locked.temporary() + ".db";
   constexpr std::array kSuffixes = {"", "-journal", "-wal", "-shm"};
   const auto remove = [&] {
     for (const char* suffix : kSuffixes) {
@@ -24,7 +27,7 @@ Result<ExchangeReport> make_store_file(
       }
     }
   };
-  remove();
+  remove();  // what a process that is gone left
   for (const char* suffix : kSuffixes) {
     note_temporary(temporary + suffix);
   }
@@ -65,6 +68,7 @@ Result<ExchangeReport> backup(Store& store, Env& env, const std::string& path) {
                 "choose another name for the backup");
   }
   return make_store_file(env, path, [&](const std::string& temporary) -> Result<ExchangeReport> {
+    SIXPOINT_ASSIGN(const Head before, read_head(store.database()));
     SIXPOINT_ASSIGN(const bool copied, store.database().copy_to_file(temporary));
     // Opening makes a new store where PostgreSQL had no means of its own; both are then checked.
     SIXPOINT_ASSIGN(auto copy, Store::open(env, temporary));
@@ -76,6 +80,11 @@ Result<ExchangeReport> backup(Store& store, Env& env, const std::string& path) {
       return fail(ErrorCode::bad_data, fmt::format("the store is damaged: {}", audit.brief()),
                   store.database().location(),
                   "no backup was made; 'sixpoint audit verify' lists what was changed");
+    }
+    if (audit.rows < before.rows) {  // opening makes an empty store where the copy was removed
+      return fail(ErrorCode::io,
+                  fmt::format("the store has {} rows, its copy {}", before.rows, audit.rows), path,
+                  "see what removes or replaces files in this folder, and make the backup again");
     }
     SIXPOINT_ASSIGN(const auto count, copy.database().query("SELECT count(*) FROM attachments"));
     return ExchangeReport{audit.rows, 0, integer_of(count[0][0]), audit.head};

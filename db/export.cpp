@@ -128,7 +128,7 @@ Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const 
 
 Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::string& folder) {
   Database& database = store.database();
-  SIXPOINT_CHECK(files.make_folders(folder + "/attachments"));
+  SIXPOINT_CHECK(make_synced_folders(files, folder + "/attachments"));
   // Written last: a folder without it is no whole export.
   const std::string header_path = folder + "/store.json";
   if (files.info(header_path)) {

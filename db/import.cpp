@@ -25,17 +25,17 @@ class LineReader {
   }
   // False at the end. The last line may lack its line end.
   Result<bool> next(std::string_view& line) {
-    buffer_.erase(0, used_);
-    used_ = 0;
-    std::size_t searched = 0;
+    std::size_t searched = used_;
     while (true) {
       const std::size_t end = buffer_.find('\n', searched);
       if (end != std::string::npos) {
+        line = std::string_view(buffer_).substr(used_, end - used_);
         used_ = end + 1;
-        line = std::string_view(buffer_).substr(0, end);
         ++number_;
         return true;
       }
+      buffer_.erase(0, used_);  // once for all lines of a piece
+      used_ = 0;
       searched = buffer_.size();
       if (searched > kLongestLine) {
         return fail(ErrorCode::bad_data, fmt::format("line {} is too long", number_ + 1), path_,

@@ -64,18 +64,23 @@ Json to_json(const device::AttachedDevice& attached) {
                                         : Json(nullptr)}};
 }
 
+// What a device says of itself is shown on one line, whatever it says.
+std::string shown_model(const device::AttachedDevice& attached) {
+  return attached.model.empty() ? "?" : printable(attached.model);
+}
+
 void print_devices(Context& context, const device::AttachedDevice& attached) {
   const auto [address, access, unmounted] = standing_of(attached);
   context.out << fmt::format("{:<24} {:<20} port {:<8} {}\n",
                              printable(address.empty() ? attached.serial : address),
-                             attached.model.empty() ? "?" : attached.model, attached.port,
+                             shown_model(attached), attached.port,
                              !access     ? access.error().what
                              : unmounted ? "not mounted"
                                          : "ready");
   if (!access) {
     context.people << fmt::format("  {}\n", access.error().brief());
   } else if (unmounted) {
-    context.people << fmt::format("  {}: {}\n", attached.serial, kMountIt);
+    context.people << fmt::format("  {}: {}\n", printable(attached.serial), kMountIt);
   }
 }
 
@@ -140,8 +145,8 @@ Status watch(const DevicesCommandOptions& options, Context& context) {
       context.out << "arrived  ";
       print_devices(context, one);
     } else {
-      context.out << fmt::format("left     {:<24} {:<20} port {}\n", one.serial,
-                                 one.model.empty() ? "?" : one.model, one.port);
+      context.out << fmt::format("left     {:<24} {:<20} port {}\n", printable(one.serial),
+                                 shown_model(one), one.port);
     }
     context.out << std::flush;
   }

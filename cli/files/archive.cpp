@@ -486,7 +486,7 @@ void add_archive(CLI::App& app, Context& context) {
   run.add_option("-o,--output", of_run.output, "the folder for repaired files")->required();
   add_redo_option(run, of_run.redo_outdated);
   run.add_option("--jobs", of_run.threads, "threads that pack a file")
-      ->check(CLI::Range(1U, 256U))
+      ->check(CLI::Range(1U, repair::kMostJobs))
       ->capture_default_str();
   run.add_flag("--dry-run", of_run.dry_run, "compute everything, write nothing");
   auto [submit, of_submit] =

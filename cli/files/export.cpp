@@ -218,7 +218,7 @@ Status export_into_folder(const ExportCommandOptions& options, Outputs& outputs,
         return fail(ErrorCode::cannot_create, "another recording has the same name", file.path,
                     "export the two into separate folders");
       }
-      SIXPOINT_CHECK(outputs.files().make_folders(folder_of(csv)));
+      SIXPOINT_CHECK(make_synced_folders(outputs.files(), folder_of(csv)));
       return export_file(options, context, outputs.files(), file.path, csv);
     }();
     if (!done) {
@@ -294,7 +294,7 @@ void add_export(CLI::App& app, Context& context) {
   records->excludes(raw, no_fill, fill_limit, time, unix_time);
   command.add_flag("--gzip", options.gzip, "write .csv.gz, .npy.gz");
   add_salvage_option(command, options.salvage);
-  command.add_option("--jobs", options.jobs, "threads that pack with --gzip (default: all cores)");
+  add_jobs_option(command, options.jobs, "threads that pack with --gzip (default: all cores)");
   add_output_options(command, options.outputs);
 }
 

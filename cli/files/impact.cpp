@@ -119,6 +119,13 @@ bool is_folder(Context& context, const std::string& path) {
   return info && info->is_folder;
 }
 
+// What cannot be read, such as a link that leads nowhere: a line and an exit code like a recording's.
+void add_refused(const std::vector<repair::RefusedPath>& refused, repair::StudyImpact& study) {
+  for (const repair::RefusedPath& path : refused) {
+    study.files.push_back({path.path, {}, {}, {}, path.error});
+  }
+}
+
 // Recordings below the first folder, and those of the same names below the second.
 Status pair_folders(const ImpactCommandOptions& options, Context& context,
                     repair::StudyImpact& study) {
@@ -127,12 +134,15 @@ Status pair_folders(const ImpactCommandOptions& options, Context& context,
   SIXPOINT_ASSIGN(const auto before, repair::find_files(context.env.files, options.paths[0], how));
   for (const repair::FoundFile& file : before.files) {
     const std::string copy = options.paths[1] + "/" + file.relative;
-    if (context.env.files.info(copy)) {
+    if (const auto info = context.env.files.info(copy)) {
       study.files.push_back({file.path, copy, {}, {}, {}});
+    } else if (info.error().code != ErrorCode::no_input) {
+      study.files.push_back({file.path, copy, {}, {}, info.error()});
     } else {
       ++study.without_copy;
     }
   }
+  add_refused(before.refused, study);
   return {};
 }
 
@@ -154,6 +164,7 @@ Status pair_plan(const ImpactCommandOptions& options, Context& context,
   SIXPOINT_ASSIGN(const auto merged, repair::merge_archive(context.env.files, folder, plan, how));
   context.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
   study.without_copy += merged.files_missing();
+  add_refused(plan.refused, study);
   return {};
 }
 
@@ -181,8 +192,12 @@ Status run_study(const ImpactCommandOptions& options, repair::StudyImpact study,
   for_each_job(
       study.files.size(), options.jobs,
       [&](std::size_t i) {
-        if (Status done = measure(options, context, study, study.files[i]); !done) {
-          study.files[i].error = std::move(done.error());
+        repair::FileImpact& file = study.files[i];
+        if (file.error) {
+          return;
+        }
+        if (Status done = measure(options, context, study, file); !done) {
+          file.error = std::move(done.error());
         }
       },
       [&](std::size_t done) { progress.at(done); });

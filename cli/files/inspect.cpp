@@ -13,9 +13,6 @@
 namespace sixpoint::cli {
 namespace {
 
-std::string filter_name(std::optional<calib::FilterConfiguration> filter) {
-  return std::string(filter ? calib::to_string(*filter) : "unknown");
-}
 // Times of a recording are said by its clock.
 std::string time_or_dash(const gt3x::Clock& clock, std::optional<std::uint32_t> unix_time) {
   return unix_time ? gt3x::clock_time(clock, *unix_time) : "-";
@@ -85,8 +82,8 @@ void print_inspect(std::ostream& out, const repair::Inspection& found, const std
   line("calibrated", found.facts.calibration_time ? to_iso8601(*found.facts.calibration_time)
                                                   : std::string("not said"));
   line("filter", fmt::format("{} in force, constants measured under {}",
-                             filter_name(repair::filter_in_force(found.facts)),
-                             filter_name(repair::filter_of_constants(found.facts))));
+                             repair::filter_name(repair::filter_in_force(found.facts)),
+                             repair::filter_name(repair::filter_of_constants(found.facts))));
   if (found.constants) {
     out << fmt::format("{:<20}{:>8}{:>8}{:>8}\n", "constants in LSB", "X", "Y", "Z");
     print_axes(out, "positive", found.constants->positive_lsb);

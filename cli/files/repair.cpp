@@ -67,14 +67,13 @@ Result<repair::ConstantsFinderOptions> finder_options(const RepairCommandOptions
 std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files,
                                      const RepairCommandOptions& options,
                                      repair::ConstantsFinder& finder, repair::UnitPool& pool,
-                                     Context& context) {
+                                     StopRequest& stop, Context& context) {
   repair::RepairFilesOptions how;
   how.folder = options.folder;
   how.repair = options.repair;
   how.jobs = options.jobs;
   how.link = options.link;
   how.make_link = link_file;
-  StopRequest stop;
   std::atomic<bool> stopping{false};
   std::optional<Progress> progress;
   repair::RepairWatch watch;
@@ -189,7 +188,9 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
   auto files = named_files(context, options.paths, {".gt3x"});
   repair::leave_out_outputs(context.env.files, files, options.folder);
   repair::refuse_same_outputs(files, options.folder);
-  const auto reports = repair_all(files, options, finder, pool, context);
+  // Until the manifest is written: a signal that comes late may take the answer, never the record.
+  std::optional<StopRequest> stop(std::in_place);
+  const auto reports = repair_all(files, options, finder, pool, *stop, context);
   RepairTally tally;
   repair::UnitTable table(order_of(options.sources, store.has_value()));
   Json json = document("repair");
@@ -208,6 +209,8 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
     json["kept"] =
         keep_repairs(context, options.sources.store, opened, reports, "run it again with --resume");
   }
+  const Status left = leave_in_folder(options, reports, units, context);
+  stop.reset();
   if (options.json) {
     SIXPOINT_CHECK(print_json(context, json));
   } else {
@@ -217,9 +220,9 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
     print_units(context, units);
     context.people << tally.brief(options.repair.dry_run);
   }
-  // The answer is printed: what goes wrong now must not become a second document.
-  if (const auto status = leave_in_folder(options, reports, units, context); !status) {
-    report_error(context, status.error());
+  // Behind the answer, and by itself: returned, it would become a second document.
+  if (!left) {
+    report_error(context, left.error());
   }
   say_what_is_next(options, reports, files.size(), context);
   return {};

@@ -77,17 +77,19 @@ Status keep(const std::string& path, const SolveCommandOptions& options,
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
   origin.file = db::storable_path(file_name_of(path));
   origin.kind = repair::recording_kind(survey);
-  SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
-                                                      to_file ? options.output : ""));
-  if (to_store && !outcome.is_lent) {
-    return fail(ErrorCode::bad_data,
-                "nothing is stored: the constants are for this recording alone", path,
-                "see the notes of the answer; name the original recording");
+  SIXPOINT_ASSIGN(const auto record,
+                  calib::record_of(outcome.report, context.env.clock.now(), origin));
+  const std::string file = to_file ? options.output : "";
+  if (to_store && outcome.is_lent) {
+    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, outputs.files(), options.store, record,
+                                                  survey.model, file));
+    return {};
   }
-  if (to_store) {
-    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, survey.model));
-  }
-  return {};
+  SIXPOINT_CHECK(write_constants(outputs.files(), file, record));
+  return to_store ? Status(fail(ErrorCode::bad_data,
+                                "nothing is stored: the constants are for this recording alone",
+                                path, "see the notes of the answer; name the original recording"))
+                  : Status();
 }
 
 Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& options,

@@ -440,7 +440,7 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command.add_flag("--rates", options.shares.any_rate, "draw sample rates from 20 to 100 Hz");
   command.add_flag("--follow-suggestion", options.follow,
                    "also record the segment that each answer suggests first, and show the gain");
-  command.add_option("--jobs", options.jobs, "diagnoses at a time (0 = one per core)");
+  add_jobs_option(command, options.jobs, "diagnoses at a time (0 = one per core)");
   command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
   command.add_option("--keep", options.keep, "leave bundles and answers in this folder");
   command.add_option("--html", options.html, "also write the scores as a page");

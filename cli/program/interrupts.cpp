@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstddef>
 #include <initializer_list>
 
 #include <unistd.h>
@@ -28,9 +29,8 @@ extern "C" void end_as_stopped(int signal) {
   ::_exit(kExitStopped);
 }
 
-// The folder of `gap challenge --export`: it must be empty when the command begins. Empty: none.
-std::string export_folder(const std::vector<std::string>& arguments) {
-  const std::string option = "--export";
+// The value of an option, as `--name VALUE` or `--name=VALUE`. Empty: it is not given.
+std::string value_of(const std::vector<std::string>& arguments, const std::string& option) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == option && i + 1 < arguments.size()) {
       return arguments[i + 1];
@@ -42,10 +42,42 @@ std::string export_folder(const std::vector<std::string>& arguments) {
   return {};
 }
 
+bool has(const std::vector<std::string>& arguments, const char* flag) {
+  return std::find(arguments.begin(), arguments.end(), flag) != arguments.end();
+}
+
+std::string line_of(const std::vector<std::string>& arguments) {
+  std::string line = "sixpoint";
+  for (const std::string& argument : arguments) {
+    line.append(" ").append(bash_word(argument));
+  }
+  return line;
+}
+
 bool begins_with(const std::vector<std::string>& arguments,
                  std::initializer_list<const char*> words) {
   return arguments.size() >= words.size() &&
          std::equal(words.begin(), words.end(), arguments.begin());
+}
+
+// An export into a folder, which must be empty or used with --force.
+bool exports_into_folder(const std::vector<std::string>& arguments) {
+  const auto names_output = [](const std::string& argument) {
+    return argument.starts_with("-o") || argument == "--output" ||
+           argument.starts_with("--output=");
+  };
+  return begins_with(arguments, {"store", "export"})
+             ? has(arguments, "--csv")
+             : begins_with(arguments, {"export"}) &&
+                   std::any_of(arguments.begin(), arguments.end(), names_output);
+}
+
+// `flag` stands in front of the command's other arguments: behind a "--" it would be a path.
+std::string with_flag(std::vector<std::string> arguments, std::ptrdiff_t words, const char* flag) {
+  if (!has(arguments, flag)) {
+    arguments.insert(arguments.begin() + words, flag);
+  }
+  return line_of(arguments);
 }
 
 }  // namespace
@@ -62,15 +94,18 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
     return "\nsixpoint: stopped; the unit may still be recording: begin the capture again, with "
            "another name if its file is there\n";
   }
-  if (const std::string folder = export_folder(arguments);
+  if (const std::string folder = value_of(arguments, "--export");
       begins_with(arguments, {"gap", "challenge"}) && !folder.empty()) {
     return "\nsixpoint: stopped; remove the folder " + bash_word(folder) + " and begin again\n";
   }
-  std::string text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
-  for (const std::string& argument : arguments) {
-    text.append(" ").append(bash_word(argument));
+  if (exports_into_folder(arguments)) {
+    return "\nsixpoint: stopped; what is done stays, and this line begins again:\n  " +
+           with_flag(arguments, arguments.front() == "store" ? 2 : 1, "--force") + "\n";
   }
-  return text + "\n";
+  return "\nsixpoint: stopped; what is done stays, and this line goes on:\n  " +
+         (begins_with(arguments, {"repair"}) ? with_flag(arguments, 1, "--resume")
+                                             : line_of(arguments)) +
+         "\n";
 }
 
 void take_interrupts(const std::vector<std::string>& arguments) {

@@ -6,13 +6,16 @@
 //
 // Results appear whole or not at all, and temporary files are removed:
 //
-// | command                 | says                                                |
-// |-------------------------|-----------------------------------------------------|
-// | archive plan            | no plan was made                                    |
-// | scan, inspect, simulate | nothing was written: they write at their end        |
-// | capture                 | begin it again: the unit may still be recording     |
-// | gap challenge --export  | remove the folder and begin again: it must be empty |
-// | others                  | what is done stays, and this line goes on: the line |
+// | command                 | says                                                       |
+// |-------------------------|------------------------------------------------------------|
+// | archive plan            | no plan was made                                           |
+// | scan, inspect, simulate | nothing was written: they write at their end               |
+// | capture                 | begin it again: the unit may still be recording            |
+// | gap challenge --export  | remove the folder and begin again: it must be empty        |
+// | export -o,              | what is done stays, and this line begins again: the line   |
+// | store export --csv      | with --force, since the folder is not empty any more       |
+// | repair                  | what is done stays, and this line goes on: with --resume   |
+// | others                  | what is done stays, and this line goes on: the line        |
 //
 // A file that grows beyond the limit of a file's size (ulimit -f: SIGXFSZ) does not end the program:
 // the write fails as on a full disk, exit 74.

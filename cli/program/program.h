@@ -7,7 +7,6 @@
 // A command is defined in one of the rooms below; commands.cpp lists all of them.
 #pragma once
 
-#include <exception>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,15 +28,6 @@ const std::vector<CommandEntry>& commands();
 
 // Declares all of them, each with its examples (examples.h).
 void declare_commands(CLI::App& app, Context& context);
-
-// What an exception that no library caught says to people. The libraries return errors as values, so
-// it is a limit of the machine or a defect of this program:
-//
-//     exception                                              code       says
-//     std::bad_alloc; a system_error "not enough memory"     io         not enough memory
-//     a system_error "resource unavailable, try again"       io         no more threads
-//     any other                                              internal   please report it
-Error error_of(const std::exception& exception);
 
 // Parses, runs, returns the exit code. `arguments` do not hold the program's name. No state is left
 // behind: a test calls it many times in one process.

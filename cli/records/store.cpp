@@ -152,7 +152,7 @@ Result<Answer> reinstate(const StoreCommandOptions& options, Context& context) {
 }
 
 Result<Answer> prefer(const StoreCommandOptions& options, Context& context) {
-  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "prefer"));
   answer.json["preferred"] = answer.json["about"]["id"];
   answer.note = "of the sets of this unit and filter, these constants apply now";

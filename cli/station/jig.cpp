@@ -422,7 +422,12 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
   }
   if (done.kept && done.kept->in_store()) {
     if (store) {
-      SIXPOINT_ASSIGN(record.head, store->head_of_run(record.id));
+      const auto head = store->head_of_run(record.id);
+      if (!head) {  // the run is stored: its report is printed, without papers
+        report_error(context, head.error());
+        return done;
+      }
+      record.head = *head;
     }
     make_papers(context, options, outputs, record, done);
   } else if (done.kept) {

@@ -2,6 +2,8 @@
 #include "cli/station/operator.h"
 
 #include <algorithm>
+#include <array>
+#include <csignal>
 
 #include <fmt/format.h>
 #include <termios.h>
@@ -21,20 +23,63 @@ struct OperatorCommandOptions {
   bool json = false;
 };
 
-// Typed at a terminal it is not shown; from a pipe it is the first line.
-std::string read_pin(Context& context, const std::string& whose) {
-  context.people << fmt::format("PIN of {}: ", printable(whose, 80)) << std::flush;
-  termios shown{};
-  const bool at_terminal = tcgetattr(STDIN_FILENO, &shown) == 0;
-  if (at_terminal) {
-    termios hidden = shown;
+// What the handler below needs, for one prompt at a time.
+constexpr std::array kEndingSignals = {SIGINT, SIGTERM, SIGHUP};
+termios shown_terminal{};
+std::array<struct sigaction, kEndingSignals.size()> actions_before{};
+
+void restore_actions() {
+  for (std::size_t i = 0; i < kEndingSignals.size(); ++i) {
+    ::sigaction(kEndingSignals[i], &actions_before[i], nullptr);
+  }
+}
+
+// The terminal shows again what is typed; then the signal does what it did before.
+extern "C" void show_and_go_on(int signal) {
+  tcsetattr(STDIN_FILENO, TCSANOW, &shown_terminal);
+  restore_actions();
+  ::raise(signal);  // comes when this returns
+}
+
+// While it lives, a terminal on standard input does not show what is typed.
+class HiddenTyping {
+ public:
+  HiddenTyping() : at_terminal_(tcgetattr(STDIN_FILENO, &shown_terminal) == 0) {
+    if (!at_terminal_) {
+      return;
+    }
+    for (std::size_t i = 0; i < kEndingSignals.size(); ++i) {
+      ::sigaction(kEndingSignals[i], nullptr, &actions_before[i]);
+      if (actions_before[i].sa_handler != SIG_IGN) {
+        struct sigaction action {};
+        action.sa_handler = show_and_go_on;
+        ::sigaction(kEndingSignals[i], &action, nullptr);
+      }
+    }
+    termios hidden = shown_terminal;
     hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
     tcsetattr(STDIN_FILENO, TCSANOW, &hidden);
   }
+  HiddenTyping(const HiddenTyping&) = delete;
+  HiddenTyping& operator=(const HiddenTyping&) = delete;
+  ~HiddenTyping() {
+    if (at_terminal_) {
+      tcsetattr(STDIN_FILENO, TCSANOW, &shown_terminal);
+      restore_actions();
+    }
+  }
+
+ private:
+  bool at_terminal_;
+};
+
+// Typed at a terminal it is not shown; from a pipe it is the first line.
+std::string read_pin(Context& context, const std::string& whose) {
+  context.people << fmt::format("PIN of {}: ", printable(whose, 80)) << std::flush;
   std::string pin;
-  std::getline(context.in, pin);
-  if (at_terminal) {
-    tcsetattr(STDIN_FILENO, TCSANOW, &shown);
+  {
+    const HiddenTyping hidden;
+    std::getline(context.in, pin);
   }
   context.people << "\n";
   return pin;

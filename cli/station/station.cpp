@@ -283,7 +283,7 @@ int serve_until_signal(station::Server& server, const sigset_t& signals, EndInTi
     while (!stop.stop_requested() &&
            (signal = sigtimedwait(&signals, nullptr, &between_checks)) < 0) {
     }
-    end.begin(signal == SIGINT ? kExitStopped : 0);
+    end.begin(exit_of_stop(signal));
     server.stop();
   });
   server.serve();

@@ -8,6 +8,7 @@
 #include "base/serial.h"
 #include "base/sha256.h"
 #include "gt3x/forms/info.h"
+#include "gt3x/forms/model.h"
 #include "gt3x/recording_writer.h"
 
 namespace sixpoint::device {
@@ -77,7 +78,7 @@ Result<Identity> DriveUnit::read_identity() const {
   SIXPOINT_ASSIGN(const Bytes text, read_file(env_.files, path_of(kInfoName), kMostInfo_bytes));
   SIXPOINT_ASSIGN(const gt3x::Info info, gt3x::Info::parse(as_text(text)));
   Identity identity;
-  identity.serial = info.serial();
+  identity.serial = gt3x::unit_serial(info.serial());
   if (!is_serial(identity.serial)) {
     return fail(ErrorCode::bad_data, "info.txt names no serial number of a unit",
                 path_of(kInfoName), "copy the recording with the vendor's software");

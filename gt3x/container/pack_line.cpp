@@ -1,6 +1,8 @@
 #include "gt3x/container/pack_line.h"
 
 #include <algorithm>
+#include <exception>
+#include <system_error>
 #include <utility>
 
 namespace sixpoint::gt3x {
@@ -11,7 +13,11 @@ PackLine::PackLine(unsigned jobs, Sink sink)
 Status PackLine::write_oldest() {
   Slot& slot = slots_[written_++ % slots_.size()];
   if (slot.done.valid()) {
-    slot.done.get();
+    try {
+      slot.done.get();
+    } catch (const std::exception& exception) {
+      return fail(error_of(exception));
+    }
   }
   return sink_(slot.packed);
 }
@@ -30,12 +36,18 @@ Status PackLine::put(Bytes& piece, PiecePacker::Place place) {
     if (begun_ >= packers_.size()) {
       before = slots_[(begun_ - packers_.size()) % slots_.size()].done;
     }
-    slot.done = std::async(std::launch::async, [&slot, &packer, place, before] {
+    const auto pack = [&slot, &packer, place, before] {
       if (before.valid()) {
         before.wait();
       }
       packer.pack(slot.piece, place, slot.packed);
-    });
+    };
+    try {
+      slot.done = std::async(std::launch::async, pack);
+    } catch (const std::system_error&) {  // the system gives no more threads
+      slot.done = {};
+      pack();
+    }
   }
   ++begun_;
   return {};

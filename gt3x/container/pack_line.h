@@ -27,7 +27,8 @@ class PackLine {
  public:
   using Sink = std::function<Status(std::span<const std::uint8_t>)>;
 
-  // Threads beside the calling one; 1: the calling one packs.
+  // Threads beside the calling one; 1: the calling one packs, and also where the system gives no
+  // more threads.
   PackLine(unsigned jobs, Sink sink);
 
   // Takes the bytes of `piece` along, and leaves others there, whose memory is used again.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -41,7 +43,11 @@ class PiecewiseInflate final : public ByteSource {
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
     const std::size_t count = points_.packed_sizes.size();
     while (threads_.size() < most_threads_) {
-      threads_.emplace_back([this] { run(); });
+      try {
+        threads_.emplace_back([this] { run(); });
+      } catch (const std::system_error&) {
+        most_threads_ = threads_.size();  // the system gives no more: wait_for() does without
+      }
     }
     if (current_ == count) {
       return std::size_t{0};
@@ -49,6 +55,9 @@ class PiecewiseInflate final : public ByteSource {
     Slot& slot = slots_[current_ % slots_.size()];
     if (taken_ == 0) {
       wait_for(slot);
+    }
+    if (slot.thrown) {
+      return fail(error_of(slot.thrown));
     }
     SIXPOINT_CHECK(slot.status);
     const std::size_t bytes = std::min(out.size(), slot.piece.size() - taken_);
@@ -71,6 +80,7 @@ class PiecewiseInflate final : public ByteSource {
     Bytes packed;
     Bytes piece;
     Status status;
+    std::exception_ptr thrown;
     bool done = false;  // the above are the reader's, until it is at the end of the piece
   };
 
@@ -116,20 +126,31 @@ class PiecewiseInflate final : public ByteSource {
   void unpack_next(std::unique_lock<std::mutex> turn) {
     const std::size_t number = begun_++;
     Slot& slot = slots_[number % slots_.size()];
-    Status status = read_packed(number, slot.packed);
-    if (!status) {
+    const bool is_read = succeeds(slot, [&] { return read_packed(number, slot.packed); });
+    if (!is_read) {
       begun_ = points_.packed_sizes.size();  // what would be read next is not what the index says
     }
     turn.unlock();
-    if (status) {
-      status = unpack(number, slot);
+    if (is_read) {
+      succeeds(slot, [&] { return unpack(number, slot); });
     }
     {
       const std::lock_guard lock(mutex_);
-      slot.status = std::move(status);
       slot.done = true;
     }
     changed_.notify_all();
+  }
+
+  // An exception that left a thread would end the program: it goes to who reads.
+  template <class Work>
+  static bool succeeds(Slot& slot, const Work& work) {
+    try {
+      slot.status = work();
+      return slot.status.has_value();
+    } catch (...) {
+      slot.thrown = std::current_exception();
+      return false;
+    }
   }
 
   Status read_packed(std::size_t number, Bytes& packed) {

@@ -1,6 +1,7 @@
 #include "gt3x/container/read_ahead.h"
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 namespace sixpoint::gt3x {
@@ -37,6 +38,18 @@ ReadAhead::Piece ReadAhead::fill(Bytes bytes) {
 }
 
 void ReadAhead::run() {
+  try {
+    read_pieces();
+  } catch (...) {  // an exception that left the thread would end the program
+    {
+      const std::lock_guard lock(mutex_);
+      thrown_ = std::current_exception();
+    }
+    changed_.notify_all();
+  }
+}
+
+void ReadAhead::read_pieces() {
   for (;;) {
     Bytes buffer;
     {
@@ -66,8 +79,15 @@ void ReadAhead::run() {
 }
 
 Result<std::size_t> ReadAhead::read(std::span<std::uint8_t> out) {
-  if (!thread_.joinable()) {
-    thread_ = std::thread([this] { run(); });
+  if (!thread_.joinable() && !has_no_thread_) {
+    try {
+      thread_ = std::thread([this] { run(); });
+    } catch (const std::system_error&) {
+      has_no_thread_ = true;  // the system gives no more
+    }
+  }
+  if (has_no_thread_) {
+    return source_->read(out);
   }
   while (taken_ == current_.count) {
     if (current_.last) {
@@ -80,7 +100,10 @@ Result<std::size_t> ReadAhead::read(std::span<std::uint8_t> out) {
       current_.bytes.clear();
       changed_.notify_all();
     }
-    changed_.wait(lock, [&] { return !full_.empty(); });
+    changed_.wait(lock, [&] { return !full_.empty() || thrown_; });
+    if (full_.empty()) {
+      return fail(error_of(thrown_));
+    }
     current_ = std::move(full_.front());
     full_.pop_front();
     taken_ = 0;

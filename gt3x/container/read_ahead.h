@@ -5,12 +5,14 @@
 //   SIXPOINT_ASSIGN(const std::size_t count, ahead.read(piece));  // as source->read() would answer
 //
 // The thread begins with the first read() and ends with the object, also in the middle of the
-// source. Memory: kPieces pieces of kPieceSize bytes.
+// source; where the system gives no more threads, the caller's reads. What the source throws is an
+// error of read() (error_of() in base/error.h). Memory: kPieces pieces of kPieceSize bytes.
 #pragma once
 
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -40,6 +42,7 @@ class ReadAhead final : public ByteSource {
     bool last = false;
   };
   void run();
+  void read_pieces();
   Piece fill(Bytes bytes);
 
   std::unique_ptr<ByteSource> source_;
@@ -49,10 +52,12 @@ class ReadAhead final : public ByteSource {
   std::deque<Bytes> empty_;
   std::size_t made_ = 0;  // buffers that exist
   bool stop_ = false;
+  std::exception_ptr thrown_;  // the thread ended by it, behind what is in full_
   // Of the reading side.
   Piece current_;
   std::size_t taken_ = 0;
   std::thread thread_;
+  bool has_no_thread_ = false;
 };
 
 }  // namespace sixpoint::gt3x

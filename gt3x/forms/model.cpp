@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 
+#include "base/serial.h"
+
 namespace sixpoint::gt3x {
 namespace {
+
+constexpr std::string_view kUnknown = "unknown";
 
 struct Family {
   std::string_view prefix;
@@ -48,7 +52,19 @@ std::string_view model_of(std::string_view serial) {
     return "CentrePoint Insight Watch";
   }
   const Family* family = family_of(serial);
-  return family != nullptr ? family->model : "unknown";
+  return family != nullptr ? family->model : kUnknown;
+}
+
+std::string unit_serial(std::string_view serial) {
+  std::string unit(serial);
+  for (char& c : unit) {
+    const bool small = c >= 'a' && c <= 'z';
+    if (!small && !(c >= 'A' && c <= 'Z') && !(c >= '0' && c <= '9')) {
+      return std::string(serial);
+    }
+    c = small ? static_cast<char>(c - 'a' + 'A') : c;
+  }
+  return is_serial(unit) && model_of(unit) != kUnknown ? unit : std::string(serial);
 }
 
 std::optional<double> default_accel_scale_lsb_per_g(std::string_view serial) {

@@ -60,9 +60,8 @@ inline constexpr std::size_t kRecordOverhead = kHeaderSize + 1;
 inline constexpr std::size_t kMaxPayload = 0xFFFF;
 inline constexpr std::size_t kMaxRecord = kMaxPayload + kRecordOverhead;
 
-// Payload bytes of an EVENT record that concern samples.
+// The payload of an EVENT record that says why samples are missing; 0x09 says that they go on.
 inline constexpr std::uint8_t kEventEnterIdleSleep = 0x08;
-inline constexpr std::uint8_t kEventLeaveIdleSleep = 0x09;
 
 // A view of one record; the function that returns it says how long the bytes stay.
 struct Record {

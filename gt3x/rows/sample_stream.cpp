@@ -312,8 +312,8 @@ Result<RowArray> read_all_rows(SampleStream& stream, RowValue value,
                                const RowArrayOptions& options) {
   const std::size_t row_bytes = bytes_of_row(value);
   RowArray array;
-  std::uint64_t room = std::clamp<std::uint64_t>(
-      stream.expected_rows(), 1024, std::max<std::uint64_t>(1024, options.most_bytes / row_bytes));
+  std::uint64_t room = std::min(std::max<std::uint64_t>(stream.expected_rows(), 1024),
+                                options.most_bytes / row_bytes);
   SIXPOINT_CHECK(hold_rows(array, room, row_bytes, options.most_bytes));
   for (;;) {
     if (array.rows == room) {

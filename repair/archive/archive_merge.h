@@ -1,4 +1,5 @@
-// The results of all shards together: one answer, as one `repair` of the same files would give it.
+// The results of all shards together: one answer, as one `repair` of the same files would give it, but
+// for files without still periods (docs/repair.md, "When it is not done").
 //
 //   SIXPOINT_ASSIGN(const MergedArchive merged, merge_archive(files, "/data/plan", plan, {}));
 //   if (!merged.complete()) {

@@ -25,14 +25,6 @@ using Json = nlohmann::ordered_json;
 
 std::string results_of(const std::string& folder) { return folder + "/results"; }
 
-RepairReport failed(const std::string& input, Error error) {
-  RepairReport report;
-  report.input = input;
-  report.reasons.push_back(error.brief());
-  report.error = std::move(error);
-  return report;
-}
-
 class ShardRun {
  public:
   ShardRun(Env& env, const std::string& folder, const ArchivePlan& plan,
@@ -238,17 +230,14 @@ class ShardRun {
       if (error.code == ErrorCode::no_input) {
         error.what = "the file is gone since the plan was made: " + error.what;
       }
-      return failed(input, std::move(error));
+      return failed_report(input, error);
     }
     if (!is_as_planned(planned, input, *before)) {
-      return failed(input, changed_since_plan(input));
+      return failed_report(input, changed_since_plan(input));
     }
     const std::string output = options_.output_folder + "/" + planned.relative;
     if (const auto status = check_output_place(files_, options_.output_folder, output); !status) {
-      return failed(input, status.error());
-    }
-    if (!options_.dry_run) {
-      AtomicFile::remove_left_over(files_, output);
+      return failed_report(input, status.error());
     }
     RepairOptions options = plan_.repair.options;
     options.dry_run = options_.dry_run;
@@ -266,7 +255,7 @@ class ShardRun {
     if (!report.output.empty() && !report.resumed) {
       static_cast<void>(files_.remove(report.output));
     }
-    return failed(input, changed_since_plan(input));
+    return failed_report(input, changed_since_plan(input));
   }
 
   bool is_as_planned(const ArchiveFile& planned, const std::string& input, const FileInfo& info) {

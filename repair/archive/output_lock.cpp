@@ -55,9 +55,32 @@ tl::unexpected<Error> refusal(const std::string& folder) {
               "wait for it, then run this again");
 }
 
+bool is_document(FileSystem& files, const std::string& path, std::string_view schema) {
+  const std::string beginning = beginning_of(files, path);
+  return beginning.starts_with('{') &&
+         beginning.find(fmt::format("\"sixpoint/{}/", schema)) != std::string::npos;
+}
+
+Status refuse_record(FileSystem& files, const std::string& folder) {
+  return is_bundle(files, folder) || is_plan(files, folder)
+             ? Status(fail(ErrorCode::cannot_create,
+                           "this is a bundle or the plan of an archive; it stays as it is", folder,
+                           "choose another folder"))
+             : Status();
+}
+
 }  // namespace
 
+bool is_bundle(FileSystem& files, const std::string& folder) {
+  return is_document(files, folder + "/protocol.json", "bundle");
+}
+
+bool is_plan(FileSystem& files, const std::string& folder) {
+  return is_document(files, folder + "/plan.json", "archive-plan");
+}
+
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder) {
+  SIXPOINT_CHECK(refuse_record(files, folder));
   SIXPOINT_CHECK(make_synced_folders(files, folder));
   auto lock = files.lock(repair_lock_in(folder));
   if (!lock) {
@@ -71,6 +94,7 @@ Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::
 
 Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
                                                  const std::string& plan_id, std::size_t shard) {
+  SIXPOINT_CHECK(refuse_record(env.files, folder));
   SIXPOINT_CHECK(make_synced_folders(env.files, folder));
   const std::string path = fmt::format("{}/{}{}-{:05}{}", folder, kShardPrefix,
                                        plan_id.substr(0, kPlanDigits), shard, kShardEnding);

@@ -1,25 +1,22 @@
 #include "repair/batch/answers.h"
 
 #include <array>
-#include <cmath>
 
 #include "base/time.h"
+#include "calib/constants.h"
 #include "gt3x/forms/model.h"
 #include "gt3x/log/record.h"
 
 namespace sixpoint::repair {
 namespace {
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 Json time_or_null(std::optional<UtcTime> time) {
   return time ? Json(to_iso8601(*time)) : Json(nullptr);
 }
 Json axes(const PerAxis<int>& values) { return Json{values[0], values[1], values[2]}; }
 Json axes(const PerAxis<double>& values) {
-  return Json{number(values[0]), number(values[1]), number(values[2])};
-}
-std::string filter_name(std::optional<calib::FilterConfiguration> filter) {
-  return std::string(filter ? calib::to_string(*filter) : "unknown");
+  return Json{calib::number_or_null(values[0]), calib::number_or_null(values[1]),
+              calib::number_or_null(values[2])};
 }
 Json time_or_null(const gt3x::Clock& clock, std::optional<std::uint32_t> unix_time) {
   return unix_time ? Json(gt3x::clock_time(clock, *unix_time)) : Json(nullptr);
@@ -61,13 +58,14 @@ Json to_json(const StoredConstants& constants) {
 
 Json to_json(const InspectedStill& still) {
   const bool any = still.magnitude.blocks > 0;
-  return {{"blocks", still.magnitude.blocks},
-          {"coverage_g",
-           {{"min", any ? axes(still.coverage.min_g) : Json(nullptr)},
-            {"max", any ? axes(still.coverage.max_g) : Json(nullptr)}}},
-          {"magnitude_mg",
-           {{"mean_error", any ? number(still.magnitude.mean_mg) : Json(nullptr)},
-            {"worst_error", any ? number(still.magnitude.worst_mg) : Json(nullptr)}}}};
+  return {
+      {"blocks", still.magnitude.blocks},
+      {"coverage_g",
+       {{"min", any ? axes(still.coverage.min_g) : Json(nullptr)},
+        {"max", any ? axes(still.coverage.max_g) : Json(nullptr)}}},
+      {"magnitude_mg",
+       {{"mean_error", any ? calib::number_or_null(still.magnitude.mean_mg) : Json(nullptr)},
+        {"worst_error", any ? calib::number_or_null(still.magnitude.worst_mg) : Json(nullptr)}}}};
 }
 
 Json damage_of(const gt3x::LogStatistics& log, const gt3x::Clock& clock) {
@@ -99,6 +97,10 @@ Json losses_of(const Inspection& found) {
 
 }  // namespace
 
+std::string filter_name(std::optional<calib::FilterConfiguration> filter) {
+  return std::string(filter ? calib::to_string(*filter) : "unknown");
+}
+
 Json error_document(const Error& error) {
   return {{"code", to_string(error.code)},
           {"what", error.what},
@@ -114,15 +116,14 @@ Json inspection_to_json(const Inspection& found, const std::string& path) {
   json["firmware"] = found.facts.firmware;
   json["model"] = gt3x::model_of(found.facts.serial);
   json["device_type"] = found.device_type;
-  json["sample_rate_hz"] = found.rate_hz ? number(*found.rate_hz) : Json(nullptr);
-  json["accel_scale_lsb_per_g"] =
-      found.accel_scale_lsb_per_g ? number(*found.accel_scale_lsb_per_g) : Json(nullptr);
+  json["sample_rate_hz"] = calib::number_or_null(found.rate_hz);
+  json["accel_scale_lsb_per_g"] = calib::number_or_null(found.accel_scale_lsb_per_g);
   json["clock"] = to_json(found.clock);
   json["start"] = time_or_null(found.clock, found.start);
   json["first_after_start_s"] =
       found.first_after_start_s ? Json(*found.first_after_start_s) : Json(nullptr);
   json["samples"] = found.samples;
-  json["duration_s"] = number(found.duration_s());
+  json["duration_s"] = calib::number_or_null(found.duration_s());
   Json& records = json["records"] = Json::object();
   for (std::size_t type = 0; type < found.log.records.size(); ++type) {
     if (found.log.records[type] > 0) {
@@ -167,7 +168,7 @@ Json scanned_to_json(const ScannedFile& answer) {
   json["serial"] = answer.facts.serial;
   json["firmware"] = answer.facts.firmware;
   json["calibration_time"] = time_or_null(answer.facts.calibration_time);
-  json["evidence_mg"] = answer.evidence_mg ? number(*answer.evidence_mg) : Json(nullptr);
+  json["evidence_mg"] = calib::number_or_null(answer.evidence_mg);
   json["axes_rotated"] = answer.axes_rotated;
   json["sides"] = answer.sides;
   return json;

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ namespace sixpoint::repair {
 using Json = nlohmann::ordered_json;
 
 Json error_document(const Error& error);  // {code, what, where, hint}
+
+// "current", "legacy"; "unknown" where the facts do not suffice.
+std::string filter_name(std::optional<calib::FilterConfiguration> filter);
 
 // The document of `sixpoint inspect` without its "schema".
 Json inspection_to_json(const Inspection& found, const std::string& path);

@@ -11,6 +11,9 @@
 
 namespace sixpoint::repair {
 
+// More threads than that are asked for by mistake only: refused (usage) by every command, Python and R.
+inline constexpr unsigned kMostJobs = 256;
+
 // How many threads `jobs` asks for; 0: one per core.
 unsigned threads_of(unsigned jobs);
 

@@ -37,27 +37,28 @@ std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double
   return parsed ? parsed->constants : std::nullopt;
 }
 
-void take_constants(Inspection& found, gt3x::Recording& recording,
-                    const gt3x::SampleReader& reader) {
-  if (found.form == "agdc") {
-    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
-    found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
-    return;
-  }
+Status take_constants(Inspection& found, gt3x::Recording& recording) {
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
       add_facts(*memory, found.facts);
     }
-    return;
+    return {};
   }
-  if (reader.parameter_sets().empty()) {
-    return;
+  SIXPOINT_ASSIGN(const FirstParameters first,
+                  first_parameters(recording, /*with_constants=*/true));
+  if (first.record) {
+    add_facts(*first.record, found.facts);
   }
-  const gt3x::Parameters& first = reader.parameter_sets().front()->parameters;
-  found.constants = first.constants;
-  add_facts(first, found.facts);
-  found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(recording.info(), &first);
+  if (found.form == "agdc") {
+    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
+    found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
+    return {};
+  }
+  found.constants = first.known_constants();
+  found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(
+      recording.info(), first.record_stands_before ? &*first.record : nullptr);
+  return {};
 }
 
 void take_gaps(Inspection& found, const gt3x::GapList& gaps) {
@@ -88,7 +89,7 @@ Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStre
   found.entries = recording.entries();
   found.clock = reader.clock();
   SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
-  take_constants(found, recording, reader);
+  SIXPOINT_CHECK(take_constants(found, recording));
   if (!stream.runs().empty()) {
     found.start = stream.runs().front().unix_time;
     const gt3x::RowRun& last = stream.runs().back();

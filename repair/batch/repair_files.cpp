@@ -5,9 +5,11 @@
 #include <optional>
 #include <set>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "base/bytes.h"
+#include "base/text/json_keys.h"
 #include "gt3x/recording.h"
 #include "repair/batch/jobs.h"
 #include "repair/rescale/output_place.h"
@@ -224,6 +226,11 @@ class Run {
 
 Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const auto bytes, read_file(files, path, 1U << 20));
+  if (const auto doubled = doubled_json_key(as_text(bytes))) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the key {} stands twice", printable(*doubled, 200)), path,
+                "remove the one that is wrong");
+  }
   auto record = calib::parse_constants_record(as_text(bytes));
   if (!record) {
     Error error = record.error();
@@ -243,14 +250,6 @@ Status check_calibration_recording(FileSystem& files, const std::string& path) {
     error.hint = "a calibration file is a recording; constants in JSON are given by --constants";
   }
   return fail(std::move(error));
-}
-
-RepairReport failed_report(const std::string& input, const Error& error) {
-  RepairReport report;
-  report.input = input;
-  report.error = error;
-  report.reasons.push_back(error.brief());
-  return report;
 }
 
 void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,

@@ -65,9 +65,6 @@ std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& f
                                        UnitPool& pool, const RepairWatch& watch = {},
                                        const std::atomic<bool>* stop = nullptr);
 
-// The report of a file that could not be read at all.
-RepairReport failed_report(const std::string& input, const Error& error);
-
 // constants.json; errors name the file.
 Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path);
 

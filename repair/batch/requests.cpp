@@ -1,7 +1,6 @@
 #include "repair/batch/requests.h"
 
 #include <cstdint>
-#include <limits>
 #include <mutex>
 #include <optional>
 
@@ -35,11 +34,11 @@ class Options {
     }
     const Json& given = json_[name];
     if constexpr (std::is_same_v<Value, unsigned>) {
-      constexpr unsigned kMost = std::numeric_limits<unsigned>::max();
-      if (given.is_number_unsigned() && given.get<std::uint64_t>() <= kMost) {
+      // Threads: there is no other whole number among the options.
+      if (given.is_number_unsigned() && given.get<std::uint64_t>() <= kMostJobs) {
         value = given.get<unsigned>();
       } else {
-        refuse(fmt::format("the option {} is no whole number from 0 to {}", name, kMost));
+        refuse(fmt::format("the option {} is no whole number from 0 to {}", name, kMostJobs));
       }
     } else if (std::is_same_v<Value, bool> ? given.is_boolean() : given.is_string()) {
       value = given.get<Value>();

@@ -62,7 +62,7 @@ struct Watching {
   const std::atomic<bool>* stop = nullptr;
 };
 
-// {files, summary}. A file that cannot be read is an answer among the others; errors are those of
+// {files, summary}. A file that cannot be read is an answer among the others; errors are those
 // of the store and of what the options name, cannot_create where another run is repairing into the
 // folder (repair/archive/output_lock.h), and io for a scan that was stopped (a repair that was
 // stopped answers for what it has done).

@@ -88,7 +88,9 @@ std::string StudyImpact::brief() const {
                                  "ENMO, mg", "after, mg", "+- mg", "MAD, mg", "after, mg", "file");
   for (const FileImpact& file : files) {
     if (file.error) {
-      text += fmt::format("{:>70}  {}: {}\n", "-", printable(file.after), file.error->brief());
+      text += fmt::format("{:>70}  {}: {}\n", "-",
+                          printable(file.after.empty() ? file.before : file.after),
+                          file.error->brief());
       continue;
     }
     text += fmt::format(

@@ -22,8 +22,8 @@ namespace sixpoint::repair {
 
 struct FileImpact {
   std::string before;  // paths
-  std::string after;
-  ImpactSummary was;  // with the cut points of the study
+  std::string after;   // empty: it was not looked for, since `before` cannot be read
+  ImpactSummary was;   // with the cut points of the study
   ImpactSummary is;
   std::optional<Error> error;  // why there is no answer for this file
 };

@@ -26,13 +26,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Reasons are JSON values that other programs may read, so their words stay as they are.
 // So much of a log says whether its counts can have come from its constants.
 constexpr std::uint64_t kBeginning_samples = 100'000;
 
 // From so many bytes of log.bin on.
 constexpr std::uint64_t kOnThreadsFrom = std::uint64_t{4} << 20;
 
+// Reasons are JSON values that other programs may read, so their words stay as they are.
 constexpr const char* kNotDecided =
     "what cannot be told affected is not repaired: find out what is missing first";
 constexpr const char* kNotUndone =
@@ -171,7 +171,9 @@ class Repair {
   // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
   Status survey_and_write() {
     const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
-    if (options_.dry_run || options_.salvage || env_.files.link_info(output_)) {
+    // How large a log of wide records becomes is known at its end only, and its entry is to say it
+    // before: all would be written twice.
+    if (options_.dry_run || options_.salvage || options_.wide || env_.files.link_info(output_)) {
       return another_way;
     }
     SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));

@@ -32,7 +32,8 @@
 // | changed or was replaced while it was read               | failed: bad_data, nothing written  |
 //
 // One pass or two: where the head of a large log, and constants that do not depend on the file
-// (ConstantsSource::foreseen), say what will be written, the log is surveyed and written to the
+// (ConstantsSource::foreseen), say what will be written (not RepairOptions::wide, whose size the
+// head does not say), the log is surveyed and written to the
 // temporary file in the same pass. At its end everything is decided as always, from the whole
 // survey; where that leads to other bytes, or to none, the temporary file is dropped, and what is
 // written is written in a second pass. So the answer never depends on how it came about.

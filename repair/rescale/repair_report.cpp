@@ -75,4 +75,12 @@ Json RepairReport::to_json() const {
       {"output_sha256", optional_text(output_sha256)}};
 }
 
+RepairReport failed_report(const std::string& input, const Error& error) {
+  RepairReport report;
+  report.input = input;
+  report.error = error;
+  report.reasons.push_back(error.brief());
+  return report;
+}
+
 }  // namespace sixpoint::repair

@@ -86,4 +86,7 @@ struct RepairReport {
   nlohmann::ordered_json to_json() const;
 };
 
+// The report of a file that could not be read at all.
+RepairReport failed_report(const std::string& input, const Error& error);
+
 }  // namespace sixpoint::repair

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include <fmt/format.h>
+
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"
 #include "repair/triage/still_scan.h"
@@ -83,6 +85,13 @@ RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options)
 
 Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
                                                        const RescaledLogOptions& options) {
+  if (options.mark.size() > gt3x::kMaxPayload) {  // cut, it would be none: repaired once more
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("the mark of the repair has {} bytes, a record of the log has room for {}",
+                    options.mark.size(), gt3x::kMaxPayload),
+        {}, "look at the serial number in info.txt, which the mark holds");
+  }
   std::unique_ptr<RescaledLog> source(new RescaledLog(std::move(log), options));
   if (options.first_constants.has_value()) {
     SIXPOINT_CHECK(source->set_source(options.first_constants, options.accel_scale_lsb_per_g));

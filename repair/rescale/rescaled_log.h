@@ -72,7 +72,8 @@ struct RescaledLogTally {
 
 class RescaledLog final : public gt3x::ByteSource {
  public:
-  // bad_data where the first constants are such that Eq. 1-3 cannot be used with them.
+  // bad_data where the first constants are such that Eq. 1-3 cannot be used with them, and where the
+  // mark is too long.
   static Result<std::unique_ptr<RescaledLog>> make(gt3x::LogReader log,
                                                    const RescaledLogOptions& options);
 

@@ -1,6 +1,5 @@
 #include "repair/rescale/sources.h"
 
-#include <algorithm>
 #include <array>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include "calib/application/agreement.h"
 #include "calib/application/map_to_apply.h"
 #include "db/records.h"
+#include "gt3x/forms/model.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -21,13 +21,6 @@ constexpr std::array<std::string_view, 5> kSourceNames = {"constants", "calibrat
 }  // namespace
 
 std::string_view to_string(SourceKind kind) { return kSourceNames[static_cast<std::size_t>(kind)]; }
-
-std::optional<SourceKind> parse_source_kind(std::string_view text) {
-  const auto found = std::ranges::find(kSourceNames, text);
-  return found == kSourceNames.end()
-             ? std::nullopt
-             : std::optional(static_cast<SourceKind>(found - kSourceNames.begin()));
-}
 
 std::vector<SourceKind> sources_in_order(const NamedSources& named) {
   std::vector<SourceKind> order;
@@ -53,7 +46,7 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named) {
 
 std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const FileFacts& file,
                                      bool allow_prior) {
-  if (record.serial != file.serial) {
+  if (gt3x::unit_serial(record.serial) != gt3x::unit_serial(file.serial)) {
     return fmt::format("the constants belong to unit {}, not to this one",
                        printable(record.serial, 60));
   }

@@ -37,7 +37,6 @@ namespace sixpoint::repair {
 
 enum class SourceKind { constants, calibration_file, scan, store, unit_files };
 std::string_view to_string(SourceKind kind);  // as `method` and `source.kind` have it
-std::optional<SourceKind> parse_source_kind(std::string_view text);
 
 struct NamedSources {
   bool constants = false;

@@ -1,8 +1,14 @@
 #include "repair/triage/agd.h"
 
+#include <cerrno>
+
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
+
+#include "gt3x/forms/model.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -52,16 +58,24 @@ Result<FileFacts> read_agd_facts(const std::string& path) {
       (query.getColumn(0).getString() == "deviceserial" ? facts.serial : facts.firmware) =
           query.getColumn(1).getString();
     }
+    facts.serial = gt3x::unit_serial(facts.serial);
     if (facts.serial.empty()) {
       return fail(ErrorCode::bad_data, "the settings name no unit", path,
                   "export the .agd again from its recording");
     }
     return facts;
   } catch (const SQLite::Exception& exception) {
-    const bool missing = exception.getErrorCode() == SQLITE_CANTOPEN;
-    return fail(missing ? ErrorCode::no_input : ErrorCode::bad_data,
-                fmt::format("cannot be read as an .agd: {}", exception.what()), path,
-                "check the path, or export the .agd again from its recording");
+    if (exception.getErrorCode() == SQLITE_CANTOPEN) {
+      // SQLite says no more; it reads the real disk, and so does this.
+      const bool may_read = ::faccessat(AT_FDCWD, path.c_str(), R_OK, AT_EACCESS) == 0;
+      if (!may_read && errno == EACCES) {
+        return fail(ErrorCode::permission, "this user may not read the file", path,
+                    "ask its owner, or copy it");
+      }
+      return fail(ErrorCode::no_input, "cannot be opened as an .agd", path, "check the path");
+    }
+    return fail(ErrorCode::bad_data, fmt::format("cannot be read as an .agd: {}", exception.what()),
+                path, "export the .agd again from its recording");
   }
 }
 

@@ -15,8 +15,8 @@
 
 namespace sixpoint::repair {
 
-// Read-only, without making a journal beside the file. no_input where there is no file, bad_data
-// where it is no .agd or claims more work or memory than settings need.
+// Read-only, without making a journal beside the file. no_input where there is no file, permission
+// where this user may not read it, bad_data where it is no .agd or claims more work or memory than settings need.
 Result<FileFacts> read_agd_facts(const std::string& path);
 
 }  // namespace sixpoint::repair

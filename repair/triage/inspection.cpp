@@ -103,10 +103,6 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
   if (found.samples == 0) {  // the first sample decides
     found.start = item.unix_time;
     found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, item.parameters);
-    if (item.parameters != nullptr) {
-      found.constants = item.parameters->constants;
-      add_facts(*item.parameters, found.facts);
-    }
     if (raw_counts) {
       found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
     }
@@ -217,7 +213,8 @@ class HeaderCheck {
   int said_ = 0;
 };
 
-void add_warnings(Inspection& found, const gt3x::SampleReader& reader) {
+void add_warnings(Inspection& found, const gt3x::SampleReader& reader,
+                  const FirstParameters& first) {
   const auto warn = [&](std::string text) { found.warnings.push_back(std::move(text)); };
   const gt3x::LogStatistics& log = reader.statistics();
   if (log.checksum_failures > 0) {
@@ -237,8 +234,13 @@ void add_warnings(Inspection& found, const gt3x::SampleReader& reader) {
   }
   if (found.form == "gt3x" && reader.parameter_sets().empty()) {
     warn("there are no PARAMETERS: the recording does not say which constants it was scaled with");
-  } else if (found.form == "gt3x" && !found.constants && found.samples > 0) {
+  } else if (found.form == "gt3x" && !first.constants_stand_before && found.samples > 0) {
     warn("the first sample has no complete set of constants (PARAMETERS) before it");
+  }
+  if (first.constants && !first.known_constants()) {
+    warn(
+        "PARAMETERS have some of the nine constants only, and other ones than a complete record: "
+        "which constants the first samples were made by is not known");
   }
   if (reader.constants_changed()) {
     warn("PARAMETERS are repeated with other constants; for each sample the last before it hold");
@@ -282,7 +284,14 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
     }
   }
 
-  if (!recording.has_log()) {
+  FirstParameters first;
+  if (recording.has_log()) {
+    SIXPOINT_ASSIGN(first, first_parameters(recording, /*with_constants=*/true));
+    if (first.record) {
+      add_facts(*first.record, found.facts);
+    }
+    found.constants = first.known_constants();
+  } else {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
       add_facts(*memory, found.facts);
@@ -328,18 +337,13 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   if (found.form != "agdc" || agdc) {
     found.still = still.finish(agdc && !agdc->already_applied ? &*agdc : nullptr);
   }
-  if (found.samples == 0 && !reader.parameter_sets().empty()) {
-    const gt3x::Parameters& last = reader.parameter_sets().back()->parameters;
-    found.constants = last.constants;
-    add_facts(last, found.facts);
-  }
   if (found.form == "agdc") {
     found.constants = agdc ? agdc->constants : std::nullopt;
   }
   if (found.problem) {
     found.problem->where = path;
   }
-  add_warnings(found, reader);
+  add_warnings(found, reader, first);
   if (recording.bytes_behind() > 0) {
     found.warnings.push_back(
         fmt::format("{} bytes stand behind the end of the archive; they are ignored",

@@ -46,7 +46,7 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
   SIXPOINT_ASSIGN(const Bytes bytes, gt3x::read_all(*source, 1U << 20U));
   SIXPOINT_ASSIGN(auto memory, gt3x::parse_eeprom(bytes));
   const std::string serial = recording.info().serial();
-  if (!memory.serial.empty() && memory.serial != serial) {
+  if (!memory.serial.empty() && gt3x::unit_serial(memory.serial) != gt3x::unit_serial(serial)) {
     return fail(ErrorCode::bad_data,
                 fmt::format("eeprom.bin is of {}, the recording of {}",
                             printable(memory.serial, 16), printable(serial, 16)),
@@ -69,8 +69,11 @@ void add_firmware(const std::string& firmware, FileFacts& facts) {
 
 FileFacts header_facts(const gt3x::Info& info) {
   FileFacts facts;
-  facts.serial = info.serial();
-  facts.other_serial = info.other("Serial Number").value_or("");
+  facts.serial = gt3x::unit_serial(info.serial());
+  facts.other_serial = gt3x::unit_serial(info.other("Serial Number").value_or(""));
+  if (facts.other_serial == facts.serial) {
+    facts.other_serial.clear();
+  }
   facts.firmware = info.firmware();
   add_firmware(std::string(info.other("Firmware").value_or("")), facts);
   facts.recorded = info.start();
@@ -98,15 +101,14 @@ bool has_samples(const gt3x::Record& record) {
           record.is(gt3x::RecordType::activity3));
 }
 
-// What holds for the first samples; of records whose checksum holds.
-struct FirstParameters {
-  // The last PARAMETERS before them, or else the first behind them.
-  std::optional<gt3x::Parameters> record;
-  // The same of the records that have all nine numbers.
-  std::optional<StoredConstants> constants;
-};
+}  // namespace
 
-// `with_constants`: reads on until a record has them.
+std::optional<StoredConstants> FirstParameters::known_constants() const {
+  const bool contradicted =
+      record && !record->constants && constants && !record->agrees_with(*constants);
+  return contradicted ? std::nullopt : constants;
+}
+
 Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_constants) {
   SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
   FirstParameters found;
@@ -123,12 +125,14 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
         if (parameters->constants && !(sampled && found.constants)) {
           found.constants = parameters->constants;
+          found.constants_stand_before = !sampled;
         }
         if (found.record && !parameters->firmware) {  // a later record need not repeat it
           parameters->firmware = found.record->firmware;
         }
         if (!(sampled && found.record)) {
           found.record = *std::move(parameters);
+          found.record_stands_before = !sampled;
         }
       }
     }
@@ -136,6 +140,8 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
   }
   return found;
 }
+
+namespace {
 
 // A small entry of an .agdc file; empty where it is missing or too large.
 std::string text_of(gt3x::Recording& recording, const std::string& name) {

@@ -111,7 +111,29 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording);
 FileFacts header_facts(const gt3x::Info& info);
 void add_facts(const gt3x::Parameters& in_force, FileFacts& facts);
 void add_facts(const gt3x::UnitMemory& memory, FileFacts& facts);
-// Only that; reads no further than the first samples.
+// The PARAMETERS that hold for a log's first samples. `scan`, `solve`, `repair`, `inspect` and the
+// readings of Python and R all take these; records whose checksum is wrong do not count.
+//
+// |                            | before the first sample    | else                       |
+// |----------------------------|----------------------------|----------------------------|
+// | date, firmware             | the last record            | the first record behind    |
+// | constants                  | the last complete record   | the first complete behind  |
+// | scale of the first samples | the last record            | info.txt (the header)      |
+//
+// A later record need not repeat the firmware. Of a log without samples, all records stand before.
+struct FirstParameters {
+  std::optional<gt3x::Parameters> record;
+  bool record_stands_before = false;
+  std::optional<StoredConstants> constants;
+  bool constants_stand_before = false;
+
+  // None where `record` has some of the nine numbers, and one is another one: then nothing is known
+  // (the table of Survey::constants).
+  std::optional<StoredConstants> known_constants() const;
+};
+// `with_constants`: reads on until a record has them, to the end where none has.
+Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_constants);
+// Header and first parameters; reads no further than the first samples.
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
 // no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;

@@ -67,6 +67,27 @@ TEST(AtomicFile, TakesOverWhatAProcessThatIsGoneLeft) {
   EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre("f"));
 }
 
+// Says whether the file that is removed was locked by who wrote it.
+class WatchedRemoval final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status remove(const std::string& path) override {
+    const auto lock = disk().lock(path);
+    was_locked = lock && *lock == nullptr;
+    return disk().remove(path);
+  }
+  bool was_locked = false;
+};
+
+// Else another process could take the name in between, and would lose its file.
+TEST(AtomicFile, IsRemovedWhileItIsLocked) {
+  const tests::TemporaryFolder folder;
+  WatchedRemoval files(posix_env().files);
+  { ASSERT_OK(AtomicFile::create(files, folder / "f")); }
+  EXPECT_TRUE(files.was_locked);
+  EXPECT_TRUE(files.list(folder.path())->empty());
+}
+
 TEST(AtomicFile, SaysThatANameIsTooLongForTheTemporaryOne) {
   const tests::TemporaryFolder folder;
   ASSERT_OK(write_file(posix_env().files, folder / std::string(248, 'a'), "x"));

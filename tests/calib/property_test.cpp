@@ -12,6 +12,7 @@
 namespace sixpoint::calib {
 namespace {
 
+using tests::firmware_count;
 using tests::SyntheticUnit;
 using tests::Vector;
 
@@ -36,7 +37,7 @@ RC_GTEST_PROP(Properties, ReversalRoundTrips, ()) {
   RC_ASSERT(reversal.has_value());
   const auto raw = *rc::gen::inRange(-1500, 1500);
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto count = firmware_count(stored, scale, a, raw, RecordWidth::bits12);
+    const auto count = firmware_count(stored, scale, a, raw);
     if (reversal->clipped(count)) {
       continue;
     }
@@ -45,7 +46,7 @@ RC_GTEST_PROP(Properties, ReversalRoundTrips, ()) {
     RC_ASSERT(found.first <= raw);
     RC_ASSERT(raw < found.first + found.number);
     for (int k = 0; k < found.number; ++k) {
-      RC_ASSERT(firmware_count(stored, scale, a, found.first + k, RecordWidth::bits12) == count);
+      RC_ASSERT(firmware_count(stored, scale, a, found.first + k) == count);
     }
   }
 }

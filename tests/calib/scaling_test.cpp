@@ -13,30 +13,12 @@
 namespace sixpoint::calib {
 namespace {
 
+using tests::firmware_count;
+
 // The constants of a real affected unit (domain.md's example), one with steeper scaling, one odd.
 StoredConstants affected() { return {{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}}; }
 StoredConstants steep() { return {{240, 246, 251}, {-238, -256, -261}, {3, -4, -5}}; }
 StoredConstants half() { return {{512, 1024, 2047}, {-512, -1024, -2048}, {0, 7, -3}}; }
-
-// Oracle: the tests' own forward model in synthetic_unit.h, over every raw count.
-TEST(FirmwareCount, EqualsAnIndependentForwardModel) {
-  for (const StoredConstants& stored : {affected(), steep(), half()}) {
-    for (const double scale : {256.0, 341.0, 333.5}) {
-      tests::SyntheticUnit unit;
-      unit.positive = stored.positive_lsb;
-      unit.negative = stored.negative_lsb;
-      unit.zero = stored.zero_lsb;
-      unit.accel_scale = scale;
-      for (int raw = -4096; raw <= 4096; ++raw) {
-        const tests::Sample expected = tests::stored_sample(unit, {raw, raw, raw});
-        for (std::size_t a = 0; a < kAxes; ++a) {
-          ASSERT_EQ(firmware_count(stored, scale, a, raw, RecordWidth::bits12), expected[a])
-              << "raw " << raw << " axis " << a << " scale " << scale;
-        }
-      }
-    }
-  }
-}
 
 TEST(Reversal, FindsEveryRawCountAgain) {
   for (const StoredConstants& stored : {affected(), steep(), half()}) {
@@ -46,7 +28,7 @@ TEST(Reversal, FindsEveryRawCountAgain) {
       const int span = stored.positive_lsb[a] - stored.negative_lsb[a];
       const int most = (span + 511) / 512;
       for (int raw = -2048; raw <= 2047; ++raw) {
-        const auto count = firmware_count(stored, 256, a, raw, RecordWidth::bits12);
+        const auto count = firmware_count(stored, 256, a, raw);
         if (reversal->clipped(count)) {
           continue;
         }
@@ -137,7 +119,6 @@ TEST(Rescale, UnchangedConstantsChangeNothing) {
         ASSERT_OK(reversal);
         const auto rescale = Rescale::make(*reversal, *calibration_from(stored), {.output = width});
         ASSERT_OK(rescale);
-        EXPECT_TRUE(rescale->changes_nothing());
         for (int count = lowest_count(width); count <= highest_count(width); ++count) {
           for (std::size_t a = 0; a < kAxes; ++a) {
             ASSERT_EQ((*rescale)(a, static_cast<std::int16_t>(count)), count);
@@ -157,7 +138,6 @@ TEST(Rescale, NearlyUnchangedConstantsChangeNothingButHalves) {
   }
   const auto rescale = Rescale::make(*reversal, nearly, {});
   ASSERT_OK(rescale);
-  EXPECT_FALSE(rescale->changes_nothing());
   for (int count = -2048; count <= 2047; ++count) {
     for (std::size_t a = 0; a < kAxes; ++a) {
       ASSERT_EQ((*rescale)(a, static_cast<std::int16_t>(count)), count);
@@ -176,8 +156,8 @@ TEST(Rescale, EqualsWhatTheFirmwareWouldHaveStored) {
   int exact = 0;
   for (int raw = -1500; raw <= 1500; ++raw) {
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const auto before = firmware_count(old, 256, a, raw, RecordWidth::bits12);
-      const auto wanted = firmware_count(fresh, 256, a, raw, RecordWidth::bits12);
+      const auto before = firmware_count(old, 256, a, raw);
+      const auto wanted = firmware_count(fresh, 256, a, raw);
       const auto got = (*rescale)(a, before);
       if (reversal->candidates(a, before).number == 1) {
         ASSERT_EQ(got, wanted) << "raw " << raw << " axis " << a;
@@ -231,7 +211,6 @@ TEST(Rescale, CrossAxisTermsAreAppliedToTheIntegersInOneRounding) {
   options.cross_axis = terms;
   const auto rescale = Rescale::make(*reversal, fresh, options);
   ASSERT_OK(rescale);
-  EXPECT_FALSE(rescale->changes_nothing());
   std::mt19937_64 random(5);
   std::uniform_int_distribution<int> anywhere(-700, 700);
   int exact = 0;
@@ -241,7 +220,7 @@ TEST(Rescale, CrossAxisTermsAreAppliedToTheIntegersInOneRounding) {
     bool sure = true;
     PerAxis<double> u{};
     for (std::size_t a = 0; a < kAxes; ++a) {
-      in[a] = firmware_count(old, 256, a, raw[a], RecordWidth::bits12);
+      in[a] = firmware_count(old, 256, a, raw[a]);
       sure = sure && reversal->candidates(a, in[a]).number == 1;
       u[a] = (raw[a] - fresh.zero_lsb[a]) * fresh.sensitivity_g_per_lsb[a];
     }

@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "base/stored_constants.h"
+
 namespace sixpoint::tests {
 
 using Vector = std::array<double, 3>;
@@ -83,6 +85,17 @@ inline Sample stored_sample(const SyntheticUnit& unit, const std::array<int, 3>&
     stored[a] = static_cast<std::int16_t>(count);
   }
   return stored;
+}
+
+// What a unit with these constants stores for a raw count of one axis.
+inline std::int16_t firmware_count(const StoredConstants& stored, double accel_scale_lsb_per_g,
+                                   std::size_t axis, int raw_lsb) {
+  SyntheticUnit unit;
+  unit.positive = stored.positive_lsb;
+  unit.negative = stored.negative_lsb;
+  unit.zero = stored.zero_lsb;
+  unit.accel_scale = accel_scale_lsb_per_g;
+  return stored_sample(unit, {raw_lsb, raw_lsb, raw_lsb})[axis];
 }
 
 // `seconds` at rest in one pose.

@@ -64,5 +64,25 @@ TEST_F(Workers, EveryFileIsAnsweredOnceAndInOrder) {
   EXPECT_EQ(people_.str(), "") << "a bar belongs on a terminal only";
 }
 
+TEST(JobsOption, MoreThreadsThanAnyoneMeansAreRefused) {
+  MemoryEnv memory;
+  for (const std::vector<std::string>& line :
+       {std::vector<std::string>{"repair", "a.gt3x", "-o", "out"},
+        {"scan", "a.gt3x"},
+        {"export", "a.gt3x", "--csv", "a.csv.gz", "--gzip"},
+        {"impact", "a.gt3x"},
+        {"archive", "plan", "a.gt3x", "-o", "plan"},
+        {"archive", "run", "plan", "--shard", "0", "-o", "out"}}) {
+    for (const char* jobs : {"257", "4294967295"}) {
+      std::vector<std::string> words = line;
+      words.insert(words.end(), {"--jobs", jobs});
+      EXPECT_EQ(tests::run_command(memory.env, words).exit_code, 64) << line.front();
+    }
+    std::vector<std::string> most = line;
+    most.insert(most.end(), {"--jobs", "256"});
+    EXPECT_EQ(tests::run_command(memory.env, most).exit_code, 66) << "there is no such input";
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

@@ -29,6 +29,8 @@ class FailingDatabase final : public Database {
     const std::lock_guard lock(mutex_);
     left_.reset();
   }
+  // From now on copy_to_file() says that it is done, and there is no file.
+  void lose_copies() { loses_copies_ = true; }
   bool has_failed() const {
     const std::lock_guard lock(mutex_);
     return failed_;
@@ -83,7 +85,7 @@ class FailingDatabase final : public Database {
   }
   Result<bool> copy_to_file(const std::string& path) override {
     SIXPOINT_CHECK(next_call());
-    return database_->copy_to_file(path);
+    return loses_copies_ ? Result<bool>(true) : database_->copy_to_file(path);
   }
 
  private:
@@ -116,7 +118,8 @@ class FailingDatabase final : public Database {
   }
 
   std::unique_ptr<Database> database_ = open_sqlite_in_memory().value();
-  mutable std::mutex mutex_;         // an audit asks for the indexes on a thread of its own
+  mutable std::mutex mutex_;  // an audit asks for the indexes on a thread of its own
+  bool loses_copies_ = false;
   std::optional<std::size_t> left_;  // calls before the one that fails
   bool failed_ = false;
 };

@@ -181,6 +181,14 @@ TEST_F(FailingDatabaseTest, ABackupIsWholeOrNotThere) {
   EXPECT_EQ(Store::open(env, path)->head()->head, store_->head()->head);
 }
 
+TEST_F(FailingDatabaseTest, ACopyThatGoesAwayIsNoBackup) {
+  const sixpoint::tests::TemporaryFolder folder;
+  Env env{memory_.clock, posix_env().files};
+  server_->lose_copies();
+  EXPECT_FAILS(backup(*store_, env, folder / "backup.db"), ErrorCode::io);
+  EXPECT_THAT(env.files.list(folder.path()).value(), testing::IsEmpty()) << "no empty store";
+}
+
 TEST_F(FailingDatabaseTest, TheJournalKeepsWhatTheStoreDidNotTake) {
   auto journal = Journal::open(memory_.files, "journal").value();
   RunRecord run = run_of_jig();

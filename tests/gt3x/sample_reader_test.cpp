@@ -80,7 +80,7 @@ TEST(SampleReader, GapsAndTheirReasons) {
   Bytes log = made_log(2);
   append_second(log, 5);  // 2, 3, 4 missing: unexplained
   append_record(log, RecordType::event, kStart + 6, Bytes{kEventEnterIdleSleep});
-  append_record(log, RecordType::event, kStart + 10, Bytes{kEventLeaveIdleSleep});
+  append_record(log, RecordType::event, kStart + 10, Bytes{9});
   append_second(log, 10);
   append_record(log, RecordType::activity, kStart + 11, Bytes{0x5A});
   append_second(log, 20);

@@ -1,12 +1,17 @@
 // sixpoint impact by its contract; tests/repair/impact has the numbers.
+#include <filesystem>
+#include <fstream>
+
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/jig_constants.h"
 #include "repair/six_sides.h"
 #include "run_command.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -113,6 +118,38 @@ TEST_F(ImpactCommand, OfAStudyWithoutAReadableCopyThereIsNoMean) {
   EXPECT_EQ(answer.exit_code, 65) << answer.people;
   EXPECT_TRUE(answer.json()["summary"]["enmo_mg"]["before"].is_null()) << answer.out;
   EXPECT_THAT(run({"/a", "/b"}).out, HasSubstr("no recording could be compared"));
+}
+
+// A link to a disk that is not mounted: it has a line, and is not left out in silence.
+TEST_F(ImpactCommand, WhatCannotBeReadInAStudyIsSaid) {
+  const tests::TemporaryFolder folder;
+  Env& env = posix_env();
+  ASSERT_OK(env.files.make_folders(folder / "study"));
+  ASSERT_OK(tests::six_sides().write(env.files, folder / "study/a.gt3x"));
+  std::filesystem::create_symlink(folder / "away.gt3x", folder / "study/b.gt3x");
+  std::ofstream(folder / "c.json") << tests::kConstants;
+  const auto planned = run_command(env, {"archive", "plan", folder / "study", "-o", folder / "plan",
+                                         "--shards", "1", "--constants", folder / "c.json"});
+  EXPECT_EQ(planned.exit_code, 66) << planned.people;
+  ASSERT_EQ(run_command(env, {"archive", "run", folder / "plan", "--shard", "0", "-o",
+                              folder / "out", "--json"})
+                .exit_code,
+            0);
+  for (const std::vector<std::string>& line :
+       {std::vector<std::string>{"impact", folder / "study", folder / "out"},
+        {"impact", folder / "plan"}}) {
+    EXPECT_THAT(run_command(env, line).out, HasSubstr("b.gt3x"));
+    std::vector<std::string> as_json = line;
+    as_json.emplace_back("--json");
+    const auto answer = run_command(env, as_json);
+    EXPECT_EQ(answer.exit_code, 66) << answer.out;
+    const Json json = answer.json();
+    ASSERT_EQ(json["recordings"].size(), 2U);
+    EXPECT_EQ(json["recordings"][1]["before"], folder / "study/b.gt3x");
+    EXPECT_TRUE(json["recordings"][1].contains("error"));
+    EXPECT_EQ(json["summary"]["files"], 1);
+    EXPECT_EQ(json["summary"]["failed"], 1);
+  }
 }
 
 TEST_F(ImpactCommand, OneRecordingWritesItsFiles) {

@@ -3,8 +3,11 @@
 
 #include <fstream>
 
+#include <gmock/gmock.h>
+
 #include "cli/command_fixture.h"
 #include "expect_result.h"
+#include "repair/jig_constants.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -63,6 +66,19 @@ TEST_F(RepairAnswer, ConstantsThatCannotBeReadNameTheirFile) {
   const auto read = read_constants(posix_env().files, path("c.json"));
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().where, path("c.json"));
+}
+
+// A parser would take one of the two without a word.
+TEST_F(RepairAnswer, AKeyThatStandsTwiceInAConstantsFileIsRefused) {
+  const std::string text = tests::kConstants;
+  std::ofstream(path("once.json")) << text;
+  ASSERT_OK(read_constants(posix_env().files, path("once.json")));
+  std::ofstream(path("twice.json")) << R"({"filter": "legacy",)" << text.substr(text.find('{') + 1);
+  const auto read = read_constants(posix_env().files, path("twice.json"));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::bad_data);
+  EXPECT_EQ(read.error().where, path("twice.json"));
+  EXPECT_THAT(read.error().what, testing::HasSubstr("/filter"));
 }
 
 }  // namespace

@@ -424,6 +424,26 @@ TEST_F(RepairCommand, RealFilesAreJudged) {
   }
 }
 
+// Some files have it so. The store and labels have capitals; the file's own bytes stay.
+TEST_F(RepairCommand, ASerialNumberInSmallLettersIsThatOfItsUnit) {
+  MadeRecording made = half_hour();
+  made.serial = "mos2a45130450";
+  const std::string small = folder_ / "small.gt3x";
+  ASSERT_OK(made.write(files_, small));
+  const std::string store = folder_ / "store.db";
+  ASSERT_OK(db::Store::open(posix_env(), store)->add_constants(tests::jig_constants(), "wGT3X-BT"));
+  EXPECT_EQ(run({"scan", small, "--json"}).json()["files"][0]["serial"], "MOS2A45130450");
+  EXPECT_EQ(run({"inspect", small, "--json"}).json()["serial"], "MOS2A45130450");
+  const auto answer = run({"repair", small, "-o", out_, "--store", store, "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.out << answer.people;
+  EXPECT_EQ(answer.json()["files"][0]["status"], "repaired");
+  EXPECT_EQ(answer.json()["files"][0]["serial"], "MOS2A45130450");
+  EXPECT_EQ(tests::entry_of(files_, out_ + "/small.gt3x", "info.txt"),
+            tests::entry_of(files_, small, "info.txt"));
+  EXPECT_EQ(run({"history", "MOS2A45130450", "--store", store, "--json"}).json()["repairs"].size(),
+            1U);
+}
+
 // Serial numbers of files come from outside: quotes are kept as they are, and one that no store
 // keeps does not stand in the way of the others.
 TEST_F(RepairCommand, FilesWithUnusualSerialNumbersAreRepairedAndKeptOrNamed) {

@@ -1,9 +1,13 @@
 // sixpoint scan by its contract, case by case; repair_test.cpp scans a tree on the real disk.
+#include <filesystem>
+
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/made_agd.h"
 #include "repair/made_recording.h"
 #include "run_command.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -57,6 +61,23 @@ TEST(Scan, AFileThatCannotBeReadIsOneLineAndTheWorstExitCode) {
   EXPECT_EQ(answer.json()["summary"]["unreadable"], 2);
   EXPECT_TRUE(answer.json()["files"][0]["calibration_time"].is_null());
   EXPECT_EQ(run_command(memory.env, {"scan"}).exit_code, 64);
+}
+
+TEST(Scan, AFileThatThisUserMayNotReadIsAQuestionOfRights) {
+  const tests::TemporaryFolder folder;
+  using std::filesystem::perms;
+  tests::make_agd(folder / "a.agd", "MOS2A1", "1.5.0");
+  MadeRecording made;
+  made.raw.assign(300, {60, 4, 300});
+  ASSERT_OK(made.write(posix_env().files, folder / "a.gt3x"));
+  std::filesystem::permissions(folder.path(), perms(0755));
+  for (const char* name : {"a.agd", "a.gt3x"}) {
+    std::filesystem::permissions(folder / name, perms::none);
+    for (const char* command : {"scan", "inspect"}) {
+      EXPECT_EQ(tests::exit_code_as_other_user({command, folder / name}, folder.path()), 77)
+          << command << " " << name;
+    }
+  }
 }
 
 }  // namespace

@@ -105,6 +105,19 @@ TEST_F(SolveCommand, SixSidesAreSolvedStoredAndWritten) {
   }
 }
 
+// A full disk: what was measured is in the store all the same.
+TEST_F(SolveCommand, AFileThatCannotBeWrittenStopsNotTheStore) {
+  const std::string path = write(sides_recording({0, 1, 2, 3, 4, 5}), "six.gt3x");
+  const std::string store = folder_ / "s.db";
+  const auto answer = run({"solve", path, "--json", "--save", "--store", store, "-o", "/dev/full"});
+  EXPECT_EQ(answer.exit_code, 74);
+  EXPECT_THAT(answer.people, HasSubstr("/dev/full"));
+  const Json stored = run({"history", "MOS2A45130450", "--json", "--store", store}).json();
+  ASSERT_EQ(stored["constants"].size(), 1U) << answer.people;
+  EXPECT_EQ(answer.json()["stored_id"], stored["constants"][0]["id"]);
+  EXPECT_EQ(run({"solve", path, "-o", "/dev/full"}).exit_code, 74) << "without the store";
+}
+
 TEST_F(SolveCommand, GeneticAlgorithmIsReproducible) {
   const std::string path = write(sides_recording({0, 1, 2, 3, 4, 5}), "six.gt3x");
   const auto one = run({"solve", path, "--method", "ga", "--seed", "7", "--json"});

@@ -9,6 +9,9 @@
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <pty.h>
+#include <termios.h>
+#include <utmp.h>
 
 #include "base/env.h"
 #include "base/random.h"
@@ -177,9 +180,21 @@ TEST(StoppedText, FollowsTheTable) {
   EXPECT_EQ(says({"gap", "challenge", "--trials", "9", "--export", "K 1"}), again);
   EXPECT_EQ(says({"gap", "challenge", "--export=K 1", "--trials", "9"}), again);
   EXPECT_THAT(says({"gap", "challenge", "--trials", "9"}), HasSubstr("this line goes on"));
-  EXPECT_EQ(says({"export", "a b", "-o", "o"}),
-            "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
-            "  sixpoint export 'a b' -o o\n");
+  const std::string begins =
+      "\nsixpoint: stopped; what is done stays, and this line begins again:\n";
+  EXPECT_EQ(says({"export", "a b", "-o", "o"}), begins + "  sixpoint export --force 'a b' -o o\n");
+  EXPECT_EQ(says({"export", "--output=o", "--force", "--", "a"}),
+            begins + "  sixpoint export --output=o --force -- a\n");
+  EXPECT_EQ(says({"store", "export", "--csv", "-o", "o"}),
+            begins + "  sixpoint store export --force --csv -o o\n");
+  const std::string goes_on = "\nsixpoint: stopped; what is done stays, and this line goes on:\n";
+  EXPECT_EQ(says({"store", "export", "-o", "s.jsonl"}),
+            goes_on + "  sixpoint store export -o s.jsonl\n");
+  EXPECT_EQ(says({"export", "a b", "--csv", "o"}), goes_on + "  sixpoint export 'a b' --csv o\n");
+  EXPECT_EQ(says({"repair", "-o", "o", "--", "a"}),
+            goes_on + "  sixpoint repair --resume -o o -- a\n");
+  EXPECT_EQ(says({"repair", "a", "-o", "o", "--resume"}),
+            goes_on + "  sixpoint repair a -o o --resume\n");
   EXPECT_THAT(says({"export", "a\nb"}), HasSubstr("export $'a\\x0ab'\n")) << "one line";
   EXPECT_THAT(says({}), HasSubstr("this line goes on"));
 }
@@ -218,6 +233,55 @@ TEST_F(Main, ADocumentIsWholeAlsoWhenTheProgramIsStopped) {
       EXPECT_EQ(child.wait(), line == scan ? 65 : 0) << "the signal came too late";
     }
   }
+}
+
+// A reader that has enough, such as `head -1`, takes the answer alone: the manifest is there.
+TEST_F(Main, ARepairWhoseReaderGoesLeavesItsManifest) {
+  std::filesystem::create_directory(folder_ / "study");
+  for (int i = 0; i < 2000; ++i) {
+    std::ofstream(folder_ / ("study/" + std::to_string(i) + ".gt3x")) << "no recording";
+  }
+  const std::string line = "repair " + (folder_ / "study") + " --scan -o " + (folder_ / "out");
+  // The shell's own exit code is that of the reader.
+  const std::string keep_code = "; echo $? >" + (folder_ / "code") + "; }";
+  run("--version >/dev/null; { " + std::string(SIXPOINT_PROGRAM) + " " + line + " 2>" +
+      (folder_ / "e") + keep_code + " | head -1 >/dev/null");
+  EXPECT_EQ(text("code"), "3\n") << text("e");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/manifest.csv"));
+  EXPECT_EQ(run(line + " --resume" + to("o", "e")), 65) << "the line that goes on: " << text("e");
+}
+
+TEST_F(Main, CtrlCAtThePromptForAPinLeavesATerminalThatShowsWhatIsTyped) {
+  int program = -1;
+  int terminal = -1;
+  ASSERT_EQ(::openpty(&program, &terminal, nullptr, nullptr, nullptr), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::close(program);
+    ::login_tty(terminal);
+    ::setenv("HOME", folder_.path().c_str(), 1);
+    ::unsetenv("XDG_DATA_HOME");
+    ::execl(SIXPOINT_PROGRAM, "sixpoint", "operator", "add", "Ada", nullptr);
+    ::_exit(127);
+  }
+  const auto shows = [&] {
+    termios now{};
+    return ::tcgetattr(terminal, &now) == 0 && (now.c_lflag & ECHO) != 0;
+  };
+  EXPECT_TRUE(shows());
+  for (int hundredths = 0; hundredths < 6000 && shows(); ++hundredths) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ASSERT_FALSE(shows()) << "it asks for the PIN";
+  ASSERT_EQ(::write(program, "\x03", 1), 1);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3);
+  EXPECT_TRUE(shows());
+  ::close(program);
+  ::close(terminal);
 }
 
 // A bar is for a terminal, and a file is none.

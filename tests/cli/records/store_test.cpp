@@ -153,12 +153,13 @@ TEST_F(StoreTest, AFileOrFolderThatMayNotBeWrittenIsSaidSo) {
   const auto as_other_user = [&](const std::vector<std::string>& words) {
     return tests::exit_code_as_other_user(words, folder_.path());
   };
-  const std::vector<std::string> withdraw = {"store", "withdraw",   "x", "--reason",
-                                             "y",     "--operator", "z", "--store"};
-  for (const char* name : {"a.db", "locked/a.db"}) {
-    auto words = withdraw;
-    words.push_back(path(name));
-    EXPECT_EQ(as_other_user(words), 77) << name;
+  for (const char* correction : {"withdraw", "reinstate", "prefer"}) {
+    for (const char* name : {"a.db", "locked/a.db"}) {
+      EXPECT_EQ(as_other_user({"store", correction, "x", "--reason", "y", "--operator", "z",
+                               "--store", path(name)}),
+                77)
+          << correction << " " << name;
+    }
   }
   EXPECT_EQ(as_other_user({"store", "backup", "--store", path("a.db"), "-o", path("locked/b.db")}),
             77);

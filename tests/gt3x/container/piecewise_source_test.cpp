@@ -1,5 +1,7 @@
 #include "gt3x/container/piecewise_source.h"
 
+#include <new>
+
 #include <gtest/gtest.h>
 
 #include "base/random.h"
@@ -54,6 +56,35 @@ TEST(PiecewiseSource, BytesComeInOrder) {
       EXPECT_EQ(source->read(piece).value(), 0U);
     }
   }
+}
+
+// As where there is no more memory.
+class ThrowingSource final : public ByteSource {
+ public:
+  explicit ThrowingSource(Bytes bytes) : source_(std::move(bytes)) {}
+  Result<std::size_t> read(std::span<std::uint8_t> out) override {
+    if (++reads_ > 3) {
+      throw std::bad_alloc();
+    }
+    return source_.read(out);
+  }
+  std::optional<std::uint64_t> size() const override { return source_.size(); }
+
+ private:
+  MemorySource source_;
+  int reads_ = 0;
+};
+
+TEST(PiecewiseSource, WhatIsThrownIsAnErrorBehindTheBytesBeforeIt) {
+  const InPieces made = in_pieces(17, 12'345);
+  const auto source =
+      unpack_pieces(std::make_unique<ThrowingSource>(made.stream), made.points, made.bytes.size());
+  Bytes piece(made.points.piece_size);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_OK(source->read(piece));
+  }
+  EXPECT_FAILS(source->read(piece), ErrorCode::io);
+  EXPECT_FAILS(source->read(piece), ErrorCode::io);
 }
 
 TEST(PiecewiseSource, MayEndInTheMiddle) {

@@ -1,6 +1,7 @@
 #include "gt3x/container/read_ahead.h"
 
 #include <atomic>
+#include <new>
 
 #include <gtest/gtest.h>
 
@@ -71,6 +72,28 @@ TEST_F(ReadAheadTest, AnErrorComesBehindTheBytesBeforeItAndStays) {
     got += *count;
   }
   EXPECT_EQ(got, ReadAhead::kPieceSize + 5);
+  EXPECT_FAILS(source.read(piece), ErrorCode::io);
+}
+
+// As where there is no more memory.
+class ThrowingReads final : public ByteSource {
+ public:
+  Result<std::size_t> read(std::span<std::uint8_t> /*out*/) override {
+    if (++reads_ > 2) {
+      throw std::bad_alloc();
+    }
+    return std::size_t{100};
+  }
+  std::optional<std::uint64_t> size() const override { return std::nullopt; }
+
+ private:
+  int reads_ = 0;
+};
+
+TEST_F(ReadAheadTest, WhatTheSourceThrowsIsAnErrorAndStays) {
+  ReadAhead source(std::make_unique<ThrowingReads>());
+  Bytes piece(1000);
+  EXPECT_FAILS(source.read(piece), ErrorCode::io);
   EXPECT_FAILS(source.read(piece), ErrorCode::io);
 }
 

@@ -20,6 +20,16 @@ TEST(Model, FollowsThePrefix) {
   }
 }
 
+TEST(Model, ASerialNumberIsInCapitalsWhereTheModelIsKnown) {
+  EXPECT_EQ(unit_serial("mos2a45130450"), "MOS2A45130450");
+  EXPECT_EQ(unit_serial("Cpw1b"), "CPW1B");
+  EXPECT_EQ(unit_serial("MOS2A45130450"), "MOS2A45130450");
+  EXPECT_EQ(unit_serial("ab12"), "ab12") << "another maker's";
+  EXPECT_EQ(unit_serial("mos2-a"), "mos2-a") << "no unit's";
+  EXPECT_EQ(unit_serial("mos2a451304501234"), "mos2a451304501234") << "longer than a unit's";
+  EXPECT_EQ(unit_serial(""), "");
+}
+
 TEST(Model, ScaleOnlyWhereItIsKnown) {
   EXPECT_EQ(default_accel_scale_lsb_per_g("NEO1"), 341);
   EXPECT_EQ(default_accel_scale_lsb_per_g("MOS0"), 256);

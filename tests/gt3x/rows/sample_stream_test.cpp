@@ -193,6 +193,13 @@ TEST(SampleStream, StopsAtItsLimitOfMemoryAndWhenItIsToldTo) {
   const auto too_much = read_all_rows(*stream, RowValue::g_float64, {100'000, {}});
   ASSERT_FALSE(too_much);
   EXPECT_EQ(too_much.error().code, ErrorCode::io);
+  auto little = SampleStream::open(recording, {});  // less than the first thousand rows
+  ASSERT_OK(little);
+  EXPECT_FAILS(read_all_rows(*little, RowValue::g_float64, {500 * 24, {}}), ErrorCode::io);
+  Recording short_one = opened(memory, tests::made_log(20));  // 600 rows
+  auto rows = SampleStream::open(short_one, {});
+  ASSERT_OK(rows);
+  EXPECT_FAILS(read_all_rows(*rows, RowValue::g_float64, {500 * 24, {}}), ErrorCode::io);
   auto again = SampleStream::open(recording, {});
   ASSERT_OK(again);
   const auto stopped =

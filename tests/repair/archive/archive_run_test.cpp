@@ -110,6 +110,26 @@ TEST_F(Archive, APowerCutAtEveryStepOfAShardLosesAndDoublesNothing) {
   EXPECT_GT(cuts, 40U);
 }
 
+// Shards of two plans may work in one folder, and both plans may hold a file.
+TEST_F(Archive, WhatAnotherRunIsWritingStays) {
+  MemoryEnv memory;
+  Random random(3);
+  MadeRecording made = few_seconds(random);
+  made.serial = "MOS2A45130450";
+  made.firmware = "1.5.0";
+  ASSERT_OK(memory.files.make_folders("/archive"));
+  ASSERT_OK(made.write(memory.files, "/archive/a.gt3x"));
+  const auto planned = plan(memory, draft(1));
+  ASSERT_OK(planned);
+  ASSERT_OK(memory.files.make_folders("/repaired"));
+  const std::string theirs = "/repaired/.a.gt3x.0.tmp";
+  const auto lock = memory.files.lock(theirs);
+  ASSERT_OK(lock);
+  ASSERT_OK(run_shard(memory.env, "/plan", planned->plan, shard(0)));
+  EXPECT_TRUE(memory.files.info("/repaired/a.gt3x"));
+  EXPECT_TRUE(memory.files.info(theirs));
+}
+
 TEST_F(Archive, WhatAStoppedRunDidIsNotDoneAgain) {
   MemoryEnv memory;
   fill(memory.files, 4, 12);

@@ -51,6 +51,19 @@ TEST_F(OutputLock, WhereAShardIsAtWorkOtherShardsBeginAndRepairDoesNot) {
   EXPECT_NE(of_repair(), nullptr);
 }
 
+// The commands refuse such a folder by their own rule (cli/output.h), the others by this one.
+TEST_F(OutputLock, ABundleAndAPlanAreNoOutputFolders) {
+  ASSERT_OK(memory_.files.make_folders("out"));
+  ASSERT_OK(write_file(memory_.files, "out/protocol.json", R"({"schema": "sixpoint/bundle/1"})"));
+  EXPECT_EQ(of_repair(), nullptr);
+  EXPECT_EQ(of_shard(0), nullptr);
+  ASSERT_OK(memory_.files.remove("out/protocol.json"));
+  ASSERT_OK(write_file(memory_.files, "out/plan.json", R"({"schema": "sixpoint/archive-plan/1"})"));
+  EXPECT_EQ(of_repair(), nullptr);
+  EXPECT_EQ(of_shard(0), nullptr);
+  EXPECT_EQ(memory_.files.list("out").value(), std::vector<std::string>{"plan.json"});
+}
+
 TEST_F(OutputLock, OfAShardNothingStaysNotEvenWhatAKilledOneLeft) {
   ASSERT_NE(of_shard(3), nullptr);
   EXPECT_TRUE(memory_.files.list("out").value().empty());

@@ -8,6 +8,7 @@
 #include "repair/archive/output_lock.h"
 #include "repair/batch/reading.h"
 #include "repair/batch/stoppable_files.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -23,8 +24,8 @@ TEST(Requests, TakeTheirOptionsAndNoOthers) {
   EXPECT_FALSE(request.or_scan);
   for (const char* wrong :
        {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", R"({"jobs": 4294967296})",
-        R"({"jobs": 1.5})", R"({"link_unaffected": "none"})", R"({"link_unaffected": 1})", "[]",
-        "{"}) {
+        R"({"jobs": 257})", R"({"jobs": 1.5})", R"({"link_unaffected": "none"})",
+        R"({"link_unaffected": 1})", "[]", "{"}) {
     RepairRequest other;
     EXPECT_FAILS(take_options(wrong, other), ErrorCode::usage);
   }
@@ -133,6 +134,64 @@ TEST(Reading, SaysWhatInspectSays) {
                             "already_repaired",
                             "entries"}) {
       EXPECT_EQ(ours[key], theirs[key]) << key << fill;
+    }
+  }
+}
+
+// PARAMETERS that stand elsewhere than units write them: all who name constants name the same ones.
+TEST(Reading, NamesTheParametersThatScanInspectAndRepairName) {
+  using namespace gt3x::tests;
+  const StoredConstants first = {{300, 300, 300}, {-210, -210, -210}, {40, 40, 40}};
+  const StoredConstants second = {{310, 310, 310}, {-220, -220, -220}, {50, 50, 50}};
+  const auto add = [](Bytes& log, gt3x::ParameterValues values, std::uint32_t calibrated) {
+    values[gt3x::kParameterCalibrationTime] = calibrated;
+    gt3x::append_record(log, gt3x::RecordType::parameters, kStart - 1,
+                        gt3x::encode_parameters(values));
+  };
+  gt3x::ParameterValues some = made_parameters(first);
+  some.erase({gt3x::kParameterUnitSpace, gt3x::kParameterZero});
+  gt3x::ParameterValues others = some;
+  others[{gt3x::kParameterUnitSpace, gt3x::kParameterPositive}] = 400;
+  Bytes behind;  // the first sample has none before it
+  append_second(behind, 0);
+  add(behind, made_parameters(first), 1'384'266'733);
+  Bytes two;  // the later one holds
+  add(two, made_parameters(first), 1'384'000'000);
+  add(two, made_parameters(second), 1'384'266'733);
+  Bytes incomplete;  // the constants of the first, the date of the second
+  add(incomplete, made_parameters(first), 1'384'000'000);
+  add(incomplete, some, 1'384'266'733);
+  Bytes contradicted;
+  add(contradicted, made_parameters(first), 1'384'000'000);
+  add(contradicted, others, 1'384'266'733);
+  for (auto& [log, constants] : {std::pair<Bytes&, std::optional<StoredConstants>>{behind, first},
+                                 {two, second},
+                                 {incomplete, first},
+                                 {contradicted, std::nullopt}}) {
+    append_second(log, 1);
+    MemoryEnv memory;
+    ASSERT_OK(put_recording(memory.files, "a.gt3x", log));
+    auto recording = gt3x::Recording::open(memory.files, "a.gt3x");
+    ASSERT_OK(recording);
+    auto stream = gt3x::SampleStream::open(*recording, {true, true});
+    ASSERT_OK(stream);
+    ASSERT_OK(gt3x::read_all_rows(*stream, gt3x::RowValue::lsb_int16));
+    const auto reading = reading_of(*recording, *stream);
+    const auto inspection = inspect(memory.files, "a.gt3x");
+    const auto surveyed = survey(memory.files, "a.gt3x");
+    ASSERT_OK(reading);
+    ASSERT_OK(inspection);
+    ASSERT_OK(surveyed);
+    for (const Inspection& found : {*reading, *inspection}) {
+      EXPECT_EQ(found.constants, constants);
+      EXPECT_EQ(found.facts.calibration_time, from_unix_seconds(1'384'266'733));
+      EXPECT_EQ(found.accel_scale_lsb_per_g, 256);
+    }
+    EXPECT_EQ(surveyed->facts.calibration_time, from_unix_seconds(1'384'266'733));
+    EXPECT_EQ(surveyed->constants_problem.has_value(), !constants);
+    if (constants) {
+      ASSERT_FALSE(surveyed->constants.empty());
+      EXPECT_EQ(surveyed->constants.front(), *constants) << "undone in the first samples";
     }
   }
 }

@@ -557,6 +557,15 @@ void cut_the_power_everywhere(FixedConstants& source, const RepairOptions& optio
   }
 }
 
+// A mark that is cut is none, and the output would be repaired once more.
+TEST_F(RepairFile, ASerialNumberThatNoMarkHoldsGivesNoOutput) {
+  MadeRecording made = six_sides();
+  made.serial = "MOS" + std::string(70'000, '0');
+  source_.choice.chosen->record.serial = made.serial;
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  EXPECT_NE(expect_bad_data().find("mark"), std::string::npos);
+}
+
 TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
   RepairOptions options;
   cut_the_power_everywhere(source_, options);
@@ -590,6 +599,35 @@ TEST_F(RepairFile, OnePassOpensTheInputOnceAndOnceForItsHash) {
   ASSERT_EQ(repair_file(env, "in.gt3x", "two.gt3x", source_, options).status,
             RepairStatus::repaired);
   EXPECT_EQ(files.opened["in.gt3x"], 4) << "to see how large it is, survey, hash, write";
+}
+
+// Counts the temporary files that are begun.
+class CountingOutputs final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+    ++begun;
+    return disk().create(path);
+  }
+  int begun = 0;
+};
+
+// Longer than the beginning that a one pass would go by, which does not say how large it becomes.
+TEST_F(RepairFile, ALongWideLogIsPackedOnce) {
+  MadeRecording made = six_sides();
+  const std::vector<PerAxis<int>> sides = made.raw;
+  while (made.raw.size() < 110'000) {
+    made.raw.insert(made.raw.end(), sides.begin(), sides.end());
+  }
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  CountingOutputs files(memory_.files);
+  Env env{memory_.clock, files};
+  RepairOptions options;
+  options.one_pass_from_bytes = 0;
+  options.wide = true;
+  ASSERT_EQ(repair_file(env, "in.gt3x", "out.gt3x", source_, options).status,
+            RepairStatus::repaired);
+  EXPECT_EQ(files.begun, 1);
 }
 
 // out.gt3x packed anew, with two bits of its samples turned that leave the record's checksum right.
