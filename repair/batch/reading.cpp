@@ -37,7 +37,8 @@ std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double
   return parsed ? parsed->constants : std::nullopt;
 }
 
-Status take_constants(Inspection& found, gt3x::Recording& recording) {
+Status take_constants(Inspection& found, gt3x::Recording& recording,
+                      const gt3x::SampleReader& reader) {
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
@@ -45,8 +46,7 @@ Status take_constants(Inspection& found, gt3x::Recording& recording) {
     }
     return {};
   }
-  SIXPOINT_ASSIGN(const FirstParameters first,
-                  first_parameters(recording, /*with_constants=*/true));
+  SIXPOINT_ASSIGN(const FirstParameters first, first_parameters(recording, reader));
   if (first.record) {
     add_facts(*first.record, found.facts);
   }
@@ -89,7 +89,7 @@ Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStre
   found.entries = recording.entries();
   found.clock = reader.clock();
   SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
-  SIXPOINT_CHECK(take_constants(found, recording));
+  SIXPOINT_CHECK(take_constants(found, recording, reader));
   if (!stream.runs().empty()) {
     found.start = stream.runs().front().unix_time;
     const gt3x::RowRun& last = stream.runs().back();

@@ -284,13 +284,11 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
     }
   }
 
-  FirstParameters first;
-  if (recording.has_log()) {
-    SIXPOINT_ASSIGN(first, first_parameters(recording, /*with_constants=*/true));
+  if (recording.has_log()) {  // whether axes are turned is asked of the first sample
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording, /*with_constants=*/false));
     if (first.record) {
       add_facts(*first.record, found.facts);
     }
-    found.constants = first.known_constants();
   } else {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
@@ -324,6 +322,11 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
     }
     const bool raw_counts = found.form == "agdc" && !(agdc && agdc->already_applied);
     take_samples(found, still, *item, info, raw_counts);
+  }
+  FirstParameters first;
+  if (recording.has_log()) {
+    SIXPOINT_ASSIGN(first, first_parameters(recording, reader));
+    found.constants = first.known_constants();
   }
   found.gaps = gaps.listed();
   found.gap_count = gaps.count();

@@ -141,6 +141,17 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
   return found;
 }
 
+Result<FirstParameters> first_parameters(gt3x::Recording& recording,
+                                         const gt3x::SampleReader& read) {
+  const auto& sets = read.parameter_sets();
+  if (sets.empty()) {
+    return FirstParameters();
+  }
+  return first_parameters(recording, std::ranges::any_of(sets, [](const auto& set) {
+                            return set->parameters.constants.has_value();
+                          }));
+}
+
 namespace {
 
 // A small entry of an .agdc file; empty where it is missing or too large.

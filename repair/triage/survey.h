@@ -28,6 +28,7 @@
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "gt3x/salvage_losses.h"
+#include "gt3x/sample_reader.h"
 #include "repair/triage/still_scan.h"
 #include "repair/triage/triage.h"
 
@@ -133,6 +134,9 @@ struct FirstParameters {
 };
 // `with_constants`: reads on until a record has them, to the end where none has.
 Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_constants);
+// The same of a recording that `read` read to its end, so that nothing is looked for that is not there.
+Result<FirstParameters> first_parameters(gt3x::Recording& recording,
+                                         const gt3x::SampleReader& read);
 // Header and first parameters; reads no further than the first samples.
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
