@@ -65,7 +65,7 @@ using StartCheck = std::function<Result<RetestState>(const std::string& serial)>
 // Constants of a run that passed and was not written.
 struct WaitingConstants {
   std::string serial;
-  std::string id;
+  std::string id = {};
   bool are_kept_here = false;  // as RunInStore::is_kept_here
 };
 // Before they are written: are they still good? On an error nothing is written, and the operator
