@@ -169,14 +169,38 @@ Result<Sent> Sending::to_device(std::string_view zpl) {
   }
 }
 
+// While it lives, a reader that goes is an error of a write and no signal of this thread.
+class NoBrokenPipe {
+ public:
+  NoBrokenPipe() {
+    sigset_t pending;
+    sigpending(&pending);
+    was_pending_ = sigismember(&pending, SIGPIPE) == 1;
+    sigemptyset(&broken_pipe_);
+    sigaddset(&broken_pipe_, SIGPIPE);
+    pthread_sigmask(SIG_BLOCK, &broken_pipe_, &before_);
+  }
+  NoBrokenPipe(const NoBrokenPipe&) = delete;
+  NoBrokenPipe& operator=(const NoBrokenPipe&) = delete;
+  ~NoBrokenPipe() {
+    const timespec at_once{};
+    if (!was_pending_) {
+      sigtimedwait(&broken_pipe_, nullptr, &at_once);
+    }
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+
+ private:
+  sigset_t broken_pipe_{};
+  sigset_t before_{};
+  bool was_pending_ = false;
+};
+
 }  // namespace
 
 Result<Sent> send_label(const PrinterAddress& printer, std::string_view zpl,
                         const std::stop_token& stop, double time_out_s) {
-  sigset_t broken_pipe;
-  sigemptyset(&broken_pipe);
-  sigaddset(&broken_pipe, SIGPIPE);
-  pthread_sigmask(SIG_BLOCK, &broken_pipe, nullptr);  // a reader that goes is an error of a write
+  const NoBrokenPipe no_broken_pipe;
   Sending sending(printer, stop, time_out_s);
   return printer.device.empty() ? sending.to_network(zpl) : sending.to_device(zpl);
 }

@@ -12,7 +12,7 @@
 // | device: is not there, goes away, is not ready in time    | an error                            |
 // | device: is a file, a folder or a disk                    | an error                            |
 //
-// Uses sockets and devices. May be called from any thread, which then has SIGPIPE blocked.
+// Uses sockets and devices. May be called from any thread.
 #pragma once
 
 #include <stop_token>

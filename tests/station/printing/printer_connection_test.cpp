@@ -1,6 +1,7 @@
 #include "station/printing/printer_connection.h"
 
 #include <chrono>
+#include <csignal>
 #include <fstream>
 #include <mutex>
 
@@ -119,6 +120,12 @@ TEST(PrinterConnection, ADeviceTakesTheBytes) {
     ::close(reader);
   });
   EXPECT_FAILS(send(pipe, std::string(2'000'000, 'x')), ErrorCode::device_unavailable);
+  // Nor does one wait for what this thread does next.
+  sigset_t left;
+  ASSERT_EQ(sigpending(&left), 0);
+  EXPECT_EQ(sigismember(&left, SIGPIPE), 0);
+  ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &left), 0);
+  EXPECT_EQ(sigismember(&left, SIGPIPE), 0);
 }
 
 // The system's event queue refuses a device that is always ready.

@@ -163,7 +163,8 @@ TEST_F(StationRecords, OnlyConstantsThatApplyAreWrittenAfterwards) {
   const auto id = store_.add_constants(constants, "wGT3X-BT");
   ASSERT_OK(id);
   Result<db::Store> store = std::move(store_);
-  Result<db::Store> away = fail(ErrorCode::io, "the server does not answer");
+  Result<db::Store> away =
+      fail(ErrorCode::io, "the server does not answer", {}, "see whether it runs");
   const std::string others(32, 'a');
   for (const bool is_kept_here : {false, true}) {
     EXPECT_OK(may_write(store, "MOS2A1", *id, is_kept_here));
