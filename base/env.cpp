@@ -41,18 +41,6 @@ Result<Bytes> read_file(FileSystem& files, const std::string& path, std::uint64_
   return bytes;
 }
 
-std::string beginning_of(FileSystem& files, const std::string& path) {
-  constexpr std::size_t kEnough = 4096;
-  const auto file = files.open(path);
-  std::string text(kEnough, '\0');
-  const auto count =
-      file ? (*file)->read_at(0,
-                              std::span(reinterpret_cast<std::uint8_t*>(text.data()), text.size()))
-           : Result<std::size_t>(0);
-  text.resize(count.value_or(0));
-  return text;
-}
-
 std::string folder_of(const std::string& path) {
   const auto slash = path.find_last_of('/');
   if (slash == std::string::npos) {

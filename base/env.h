@@ -140,9 +140,6 @@ Env& posix_env();
 Result<Bytes> read_file(FileSystem& files, const std::string& path,
                         std::uint64_t limit = 64ULL << 20);
 
-// Up to 4 KiB from its beginning: what kind of file it is. Nothing where it cannot be read.
-std::string beginning_of(FileSystem& files, const std::string& path);
-
 // The folder part of a path ("." where there is none), and the last part.
 std::string folder_of(const std::string& path);
 std::string file_name_of(const std::string& path);

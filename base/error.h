@@ -7,7 +7,6 @@
 // Libraries never print and never exit; they return Result<T> (result.h) with one of these inside.
 #pragma once
 
-#include <exception>
 #include <string>
 #include <string_view>
 
@@ -46,16 +45,5 @@ struct Error {
 // Text from outside (serial numbers, file names, replies) made safe for one line of a terminal:
 // control characters become \xNN, and more than `limit` bytes are cut with "...".
 std::string printable(std::string_view text, std::size_t limit = 400);
-
-// What an exception that no library caught says to people. The libraries return errors as values, so
-// it is a limit of the machine or a defect of this program:
-//
-//     exception                                              code       says
-//     std::bad_alloc; a system_error "not enough memory"     io         not enough memory
-//     a system_error "resource unavailable, try again"       io         no more threads
-//     any other                                              internal   please report it
-Error error_of(const std::exception& exception);
-// Of one that a thread caught and handed over.
-Error error_of(const std::exception_ptr& thrown);
 
 }  // namespace sixpoint

@@ -12,7 +12,7 @@
 
 #include "base/atomic_file.h"
 #include "base/forwarding_files.h"
-#include "repair/archive/output_lock.h"
+#include "repair/archive/record_folder.h"
 
 namespace sixpoint::cli {
 
@@ -35,6 +35,9 @@ void refuse_old_output(CLI::App& command, const char* name, const char* instead)
 }
 
 namespace {
+
+using repair::beginning_of;
+using repair::has_schema;
 
 constexpr std::string_view kAnotherName = "choose another name";
 constexpr std::string_view kForce = "choose another name, or replace it with --force";
@@ -66,11 +69,6 @@ bool belongs_to_database(FileSystem& files, const std::string& path) {
     }
   }
   return false;
-}
-
-bool has_schema(std::string_view beginning, std::string_view name) {
-  return beginning.starts_with('{') &&
-         beginning.find(fmt::format("\"sixpoint/{}/", name)) != std::string_view::npos;
 }
 
 bool belongs_to_record(FileSystem& files, const std::string& path, std::string_view beginning) {

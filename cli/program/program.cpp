@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <spdlog/logger.h>
 
+#include "base/thrown.h"
 #include "cli/program/examples.h"
 #include "cli/program/option_values.h"
 #include "cli/program/suggestion.h"

@@ -5,6 +5,8 @@
 #include <system_error>
 #include <utility>
 
+#include "base/thrown.h"
+
 namespace sixpoint::gt3x {
 
 PackLine::PackLine(unsigned jobs, Sink sink)

@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "base/thrown.h"
+
 namespace sixpoint::gt3x {
 namespace {
 

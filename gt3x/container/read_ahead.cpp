@@ -4,6 +4,8 @@
 #include <system_error>
 #include <utility>
 
+#include "base/thrown.h"
+
 namespace sixpoint::gt3x {
 
 ReadAhead::~ReadAhead() {

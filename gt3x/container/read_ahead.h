@@ -6,7 +6,7 @@
 //
 // The thread begins with the first read() and ends with the object, also in the middle of the
 // source; where the system gives no more threads, the caller's reads. What the source throws is an
-// error of read() (error_of() in base/error.h). Memory: kPieces pieces of kPieceSize bytes.
+// error of read() (error_of() in base/thrown.h). Memory: kPieces pieces of kPieceSize bytes.
 #pragma once
 
 #include <condition_variable>

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "repair/archive/record_folder.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -55,12 +56,6 @@ tl::unexpected<Error> refusal(const std::string& folder) {
               "wait for it, then run this again");
 }
 
-bool is_document(FileSystem& files, const std::string& path, std::string_view schema) {
-  const std::string beginning = beginning_of(files, path);
-  return beginning.starts_with('{') &&
-         beginning.find(fmt::format("\"sixpoint/{}/", schema)) != std::string::npos;
-}
-
 Status refuse_record(FileSystem& files, const std::string& folder) {
   return is_bundle(files, folder) || is_plan(files, folder)
              ? Status(fail(ErrorCode::cannot_create,
@@ -70,14 +65,6 @@ Status refuse_record(FileSystem& files, const std::string& folder) {
 }
 
 }  // namespace
-
-bool is_bundle(FileSystem& files, const std::string& folder) {
-  return is_document(files, folder + "/protocol.json", "bundle");
-}
-
-bool is_plan(FileSystem& files, const std::string& folder) {
-  return is_document(files, folder + "/plan.json", "archive-plan");
-}
 
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder) {
   SIXPOINT_CHECK(refuse_record(files, folder));

@@ -20,13 +20,9 @@
 
 namespace sixpoint::repair {
 
-// A folder that holds another record: a bundle, the plan of an archive.
-bool is_bundle(FileSystem& files, const std::string& folder);
-bool is_plan(FileSystem& files, const std::string& folder);
-
-// Both make the folder where it is not there. cannot_create for "is refused", and for such a folder,
-// whoever asks: a command, the station's page, Python, R; null where the
-// folder's file system has no locks.
+// Both make the folder where it is not there. cannot_create for "is refused", and for a folder that
+// holds another record (record_folder.h), whoever asks: a command, the station's page, Python, R;
+// null where the folder's file system has no locks.
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder);
 Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
                                                  const std::string& plan_id, std::size_t shard);
