@@ -1,14 +1,13 @@
-// What an exception that no library caught says to people. The libraries return errors as values, so
-// it is a limit of the machine or a defect of this program:
+// What an exception that no library caught says to people.
+//
+//   const Error error = error_of(std::bad_alloc());  // io: "not enough memory"
+//
+// The libraries return errors as values, so it is a limit of the machine or a defect of this program:
 //
 //     exception                                              code       says
 //     std::bad_alloc; a system_error "not enough memory"     io         not enough memory
 //     a system_error "resource unavailable, try again"       io         no more threads
 //     any other                                              internal   please report it
-//
-//   } catch (const std::exception& exception) {
-//     return fail(error_of(exception));
-//   }
 //
 // May be called from any thread.
 #pragma once
