@@ -8,7 +8,6 @@
 #include "gap/explain/blocks.h"
 #include "gap/judge/diagnose.h"
 #include "gap/simulated_bundle.h"
-#include "sanitized.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -124,21 +123,16 @@ TEST_P(Resimulation, GapAfterIsWhatTheSimulatorLeaves) {
 }
 
 std::vector<ScenarioCase> cases() {
-  std::vector<ScenarioCase> all = {
-      {"tilt", R"({"rotation_vector_deg": [0.15, -0.1, 0]})"},
-      {"sensitivity_tempco", R"({"percent_per_c": [0.03, 0.02, -0.025]})"},
-      {"warm_up", R"({"mg": [6, -4, 5], "tau_s": [300]})"},
-      {"misalignment", R"({"rotation_vector_deg": [0.3, -0.2, 0.25]})"},
-      {"non_orthogonality", R"({"yz_xz_xy": [0.004, -0.003, 0.005]})"},
-      {"second_order", R"({"mg_per_g2": [0.4, -0.3, 0.2]})"},
-      {"third_order", R"({"mg_per_g3": [0.08, -0.06, 0.05]})"},
-      {"hysteresis", R"({"mg": [0.8, -0.6, 0.7]})"},
-      {"offset_tempco", R"({"mg_per_c": [0.4, -0.3, 0.2]})"},
-      {"drift", R"({"mg_per_h": [3, -2, 2.5]})"}};
-  if (tests::kSanitized) {
-    all.resize(3);
-  }
-  return all;
+  return {{"tilt", R"({"rotation_vector_deg": [0.15, -0.1, 0]})"},
+          {"sensitivity_tempco", R"({"percent_per_c": [0.03, 0.02, -0.025]})"},
+          {"warm_up", R"({"mg": [6, -4, 5], "tau_s": [300]})"},
+          {"misalignment", R"({"rotation_vector_deg": [0.3, -0.2, 0.25]})"},
+          {"non_orthogonality", R"({"yz_xz_xy": [0.004, -0.003, 0.005]})"},
+          {"second_order", R"({"mg_per_g2": [0.4, -0.3, 0.2]})"},
+          {"third_order", R"({"mg_per_g3": [0.08, -0.06, 0.05]})"},
+          {"hysteresis", R"({"mg": [0.8, -0.6, 0.7]})"},
+          {"offset_tempco", R"({"mg_per_c": [0.4, -0.3, 0.2]})"},
+          {"drift", R"({"mg_per_h": [3, -2, 2.5]})"}};
 }
 
 INSTANTIATE_TEST_SUITE_P(Effects, Resimulation, ::testing::ValuesIn(cases()),
