@@ -54,7 +54,7 @@ Status run_shard(const ArchiveOptions& options, Context& context) {
   how.dry_run = options.dry_run;
   how.redo_outdated = options.redo_outdated;
   how.threads = options.threads;
-  how.make_link = link_file;
+  how.make_link = repair::link_file;
   StopRequest stop;
   how.stop = [&stop] { return stop.requested(); };
   how.software = station::software_and_build();

@@ -32,7 +32,7 @@ struct RepairCommandOptions {
   std::string folder;
   RepairSources sources;
   repair::RepairOptions repair;
-  LinkKind link = LinkKind::none;
+  repair::LinkKind link = repair::LinkKind::none;
   bool report = false;
   unsigned jobs = 0;
   bool json = false;
@@ -73,7 +73,7 @@ std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files,
   how.repair = options.repair;
   how.jobs = options.jobs;
   how.link = options.link;
-  how.make_link = link_file;
+  how.make_link = repair::link_file;
   std::atomic<bool> stopping{false};
   std::optional<Progress> progress;
   repair::RepairWatch watch;
@@ -118,7 +118,7 @@ std::string line_that_goes_on(const RepairCommandOptions& options) {
                                     {" --report", options.report}}) {
     line += given ? flag : "";
   }
-  if (options.link != LinkKind::none) {
+  if (options.link != repair::LinkKind::none) {
     add("--link-unaffected", std::string(to_string(options.link)));
   }
   return line + " --resume";

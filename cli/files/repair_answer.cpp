@@ -52,10 +52,11 @@ void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
                    "write a file also where its own still periods say that it does not help");
 }
 
-void add_link_option(CLI::App& command, LinkKind& link) {
+void add_link_option(CLI::App& command, repair::LinkKind& link) {
   command
       .add_option_function<std::string>(
-          "--link-unaffected", [&link](const std::string& text) { link = *parse_link_kind(text); },
+          "--link-unaffected",
+          [&link](const std::string& text) { link = *repair::parse_link_kind(text); },
           "hard or symbolic: links of the files that need no repair, so that the output folder "
           "holds the whole study")
       ->check(CLI::IsMember(std::vector<std::string>{"hard", "symbolic"}));

@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "base/link_file.h"
 #include "cli/context.h"
 #include "cli/store_option.h"
+#include "repair/archive/link_file.h"
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/rescale/sources.h"
@@ -45,7 +45,7 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
 void add_repair_options(CLI::App& command, repair::RepairOptions& options);
 
 // --link-unaffected hard|symbolic
-void add_link_option(CLI::App& command, LinkKind& link);
+void add_link_option(CLI::App& command, repair::LinkKind& link);
 // --redo-outdated
 void add_redo_option(CLI::App& command, bool& redo_outdated);
 

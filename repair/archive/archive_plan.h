@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "base/env.h"
-#include "base/link_file.h"
+#include "repair/archive/link_file.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"

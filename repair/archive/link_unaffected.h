@@ -1,7 +1,7 @@
 // Files that need no repair get a name in the output folder too, so that it holds the whole study.
 //
 //   const LinkMaker make = [](const auto& from, const auto& to, LinkKind kind) {
-//     return link_file(from, to, kind);   // base/link_file.h
+//     return link_file(from, to, kind);   // repair/archive/link_file.h
 //   };
 //   link_unaffected(files, make, LinkKind::hard, "/repaired/a.gt3x", report);
 //   report.linked;  // "/repaired/a.gt3x"
@@ -22,7 +22,7 @@
 #include <string>
 
 #include "base/env.h"
-#include "base/link_file.h"
+#include "repair/archive/link_file.h"
 #include "repair/rescale/repair_file.h"
 
 namespace sixpoint::repair {

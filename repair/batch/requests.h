@@ -18,7 +18,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/env.h"
-#include "base/link_file.h"
+#include "repair/archive/link_file.h"
 #include "repair/batch/answers.h"
 
 namespace sixpoint::repair {

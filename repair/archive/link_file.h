@@ -12,7 +12,7 @@
 
 #include "base/result.h"
 
-namespace sixpoint {
+namespace sixpoint::repair {
 
 enum class LinkKind : std::uint8_t { none, hard, symbolic };
 std::string_view to_string(LinkKind kind);  // "none", "hard", "symbolic"
@@ -22,4 +22,4 @@ std::optional<LinkKind> parse_link_kind(std::string_view text);
 // cannot_create otherwise. A symbolic link holds the real path of `from`. Nothing for `none`.
 Status link_file(const std::string& from, const std::string& to, LinkKind kind);
 
-}  // namespace sixpoint
+}  // namespace sixpoint::repair

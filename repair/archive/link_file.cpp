@@ -1,4 +1,4 @@
-#include "base/link_file.h"
+#include "repair/archive/link_file.h"
 
 #include <array>
 #include <cerrno>
@@ -7,7 +7,7 @@
 
 #include <unistd.h>
 
-namespace sixpoint {
+namespace sixpoint::repair {
 namespace {
 
 constexpr std::array<std::string_view, 3> kLinkNames = {"none", "hard", "symbolic"};
@@ -55,4 +55,4 @@ Status link_file(const std::string& from, const std::string& to, LinkKind kind) 
               to, "");
 }
 
-}  // namespace sixpoint
+}  // namespace sixpoint::repair
