@@ -200,8 +200,15 @@ Result<SavedConstants> save_constants(Context& context, FileSystem& files,
                                       const calib::ConstantsRecord& record,
                                       const std::string& model, const std::string& path) {
   auto saved = save_in_store(context, location, record, model);
-  if (const Status written = write_constants(files, path, record); !written) {
-    report_error(context, written.error());
+  Status written = write_constants(files, path, record);
+  if (!saved) {
+    if (!written) {
+      report_error(context, written.error());
+    }
+    return saved;
+  }
+  if (!written) {
+    saved->file_problem = std::move(written).error();
   }
   return saved;
 }

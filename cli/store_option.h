@@ -11,6 +11,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -92,9 +93,9 @@ Status write_constants(FileSystem& files, const std::string& path,
 struct SavedConstants {
   std::string id;
   db::Saved place;
+  std::optional<Error> file_problem = std::nullopt;  // why their file was not written
 };
-// Also written to the file `path` of `files`. Neither stops the other: what is wrong with the file
-// is reported (report_error), and the answer is about the store.
+// Also written to the file `path` of `files`. Neither stops the other.
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,
                                       const std::string& location,
                                       const calib::ConstantsRecord& record,

@@ -83,7 +83,7 @@ Status keep(const std::string& path, const SolveCommandOptions& options,
   if (to_store && outcome.is_lent) {
     SIXPOINT_ASSIGN(outcome.saved, save_constants(context, outputs.files(), options.store, record,
                                                   survey.model, file));
-    return {};
+    return outcome.saved->file_problem ? Status(fail(*outcome.saved->file_problem)) : Status();
   }
   SIXPOINT_CHECK(write_constants(outputs.files(), file, record));
   return to_store ? Status(fail(ErrorCode::bad_data,

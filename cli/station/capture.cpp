@@ -151,6 +151,9 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
   } else if (done.report.usable()) {
     SIXPOINT_ASSIGN(done.saved,
                     save_capture(context, env, options.store, done.report, options.constants_out));
+    if (done.saved->file_problem) {
+      report_error(context, *done.saved->file_problem);
+    }
   }
   return done;
 }
@@ -171,6 +174,9 @@ Json to_json(const CaptureDone& done) {
   json["sha256"] = text_or_null(done.report.file_sha256);
   json["stored_id"] = done.saved ? Json(done.saved->id) : Json(nullptr);
   json["kept"] = done.saved ? kept_to_json(done.saved->place) : Json(nullptr);
+  if (done.saved && done.saved->file_problem) {
+    json["error"] = error_to_json(*done.saved->file_problem);
+  }
   return json;
 }
 

@@ -106,11 +106,11 @@ class StationStore {
   Result<station::RunInStore> add_run(const station::JigReport& measured,
                                       const station::RunLabels& labels);
   // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
-  Result<std::string> add_constants(const station::CaptureReport& report) {
+  Result<station::KeptConstants> add_constants(const station::CaptureReport& report) {
     const std::lock_guard lock(mutex_);
-    SIXPOINT_ASSIGN(const auto saved, save_capture(context_, context_.env, options_.store, report,
-                                                   report.file + ".constants.json"));
-    return saved.id;
+    SIXPOINT_ASSIGN(auto saved, save_capture(context_, context_.env, options_.store, report,
+                                             report.file + ".constants.json"));
+    return station::KeptConstants{std::move(saved.id), std::move(saved.file_problem)};
   }
   Result<station::RunDocument> document(const std::string& run_id, const std::string& kind);
   // Labels of runs go there by themselves from now on (print_rule.h).

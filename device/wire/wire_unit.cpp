@@ -9,6 +9,7 @@
 #include "base/crc_ccitt.h"
 #include "device/wire/calibration_page.h"
 #include "device/wire/payload.h"
+#include "gt3x/forms/model.h"
 
 namespace sixpoint::device {
 
@@ -42,6 +43,13 @@ tl::unexpected<Error> swapped(const std::string& where, const std::string& was,
               where, "put the first unit back, or begin anew with this one");
 }
 
+// Its serial is the one that the files of this unit are known by.
+Result<Identity> identity_in(std::span<const std::uint8_t> payload) {
+  SIXPOINT_ASSIGN(Identity identity, decode_identity(payload));
+  identity.serial = gt3x::unit_serial(identity.serial);
+  return identity;
+}
+
 }  // namespace
 
 tl::unexpected<Error> WireUnit::bad_answer(std::string what) const {
@@ -57,8 +65,8 @@ Result<std::unique_ptr<Unit>> WireUnit::open(Link link, WireOptions options) {
 
 Status WireUnit::introduce(const std::string& expected) {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify, {}, true));
-  SIXPOINT_ASSIGN(const Identity identity, decode_identity(payload));
-  if (!link_.serial.empty() && link_.serial != identity.serial) {
+  SIXPOINT_ASSIGN(const Identity identity, identity_in(payload));
+  if (!link_.serial.empty() && gt3x::unit_serial(link_.serial) != identity.serial) {
     return bad_answer(fmt::format("the unit is {} by its USB descriptor and {} by its own answer",
                                   printable(link_.serial, 80), identity.serial));
   }
@@ -106,7 +114,7 @@ Status WireUnit::reconnect(nanoseconds patience, const std::function<Status()>& 
 
 Result<Identity> WireUnit::identify() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify));
-  SIXPOINT_ASSIGN(Identity identity, decode_identity(payload));
+  SIXPOINT_ASSIGN(Identity identity, identity_in(payload));
   if (identity.serial != identity_.serial) {
     return swapped(link_.address, identity_.serial, identity.serial);
   }

@@ -5,8 +5,9 @@
 //   SIXPOINT_ASSIGN(const std::size_t count, ahead.read(piece));  // as source->read() would answer
 //
 // The thread begins with the first read() and ends with the object, also in the middle of the
-// source; where the system gives no more threads, the caller's reads. What the source throws is an
-// error of read() (error_of() in base/thrown.h). Memory: kPieces pieces of kPieceSize bytes.
+// source; where the system gives no more threads, the caller's reads. What the source throws in the
+// thread is an error of read() (error_of() in base/thrown.h). Memory: kPieces pieces of kPieceSize
+// bytes.
 #pragma once
 
 #include <condition_variable>

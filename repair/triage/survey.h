@@ -137,7 +137,8 @@ Result<FirstParameters> first_parameters(gt3x::Recording& recording, bool with_c
 // The same of a recording that `read` read to its end, so that nothing is looked for that is not there.
 Result<FirstParameters> first_parameters(gt3x::Recording& recording,
                                          const gt3x::SampleReader& read);
-// Header and first parameters; reads no further than the first samples.
+// Header and first parameters; reads no further than the first samples where parameters stand before
+// them, and to the end where there are none.
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
 // no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;

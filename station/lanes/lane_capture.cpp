@@ -150,11 +150,13 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
       report ? result_of(*report) : result_of(report.error(), state.serial, stop_requested());
   if (report && report->usable()) {
     const std::lock_guard lock(shared_.store_mutex);
-    if (const auto id = shared_.store_constants(*report)) {
+    const auto stored = shared_.store_constants(*report);
+    if (stored) {
       result["stored"] = true;
-      result["constants_id"] = *id;
-    } else {
-      result["problem"] = id.error().brief();
+      result["constants_id"] = stored->id;
+    }
+    if (!stored || stored->file_problem) {
+      result["problem"] = (stored ? *stored->file_problem : stored.error()).brief();
     }
   }
   end_capture(std::move(result));

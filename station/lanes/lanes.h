@@ -71,8 +71,13 @@ struct WaitingConstants {
 // Before they are written: are they still good? On an error nothing is written, and the operator
 // reads why. May be empty.
 using WriteCheck = std::function<Status(const WaitingConstants&)>;
-// Stores the constants of a calibration file; answers with their id in the store.
-using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;
+// What became of the constants of a calibration file.
+struct KeptConstants {
+  std::string id;                     // in the store
+  std::optional<Error> file_problem;  // why FILE.constants.json was not written
+};
+// Stores the constants of a calibration file, and writes them beside it.
+using StoreConstants = std::function<Result<KeptConstants>(const CaptureReport&)>;
 
 struct LanesOptions {
   std::vector<std::string> devices;  // one lane each, 1 to kMostLanes

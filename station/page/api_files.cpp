@@ -103,12 +103,16 @@ ApiAnswer Api::check_file(const Json& body) {
     report.file = *path;
     report.file_sha256 = check->sha256;
     report.solved = check->solved;
-    const auto id = parts_.store_constants(report);
-    if (!id) {
-      return refusal(id.error());
+    const auto stored = parts_.store_constants(report);
+    if (!stored) {
+      return refusal(stored.error());
     }
-    json["stored_id"] = *id;
-    json["constants_file"] = *name + ".constants.json";
+    json["stored_id"] = stored->id;
+    if (stored->file_problem) {
+      json["problem"] = stored->file_problem->brief();
+    } else {
+      json["constants_file"] = *name + ".constants.json";
+    }
   }
   return answer(200, json);
 }

@@ -290,7 +290,7 @@ export const EN = {
     checkText: 'A calibration file that was recorded without this program: is every side in it?',
     check: 'Check',
     save: 'Save its constants',
-    saved: (file: string) => `Constants saved in ${file} and in the store.`,
+    saved: (file: string) => file ? `Constants saved in ${file} and in the store.` : 'Constants saved in the store.',
     usable: 'This file can be used: every side is in it.',
     notUsable: 'This file cannot be used yet.',
     again: (sides: Pose[]) => `The unit did not lie still for long enough on ${sides.map(faceName).join(', ')}: it moved, or lay on another side. Only ${sides.length === 1 ? 'this side is' : 'these sides are'} asked for again; the others are kept.`,

@@ -55,7 +55,7 @@ function Capture({ state, setProblem }: { state: State; setProblem: SetProblem }
 
 interface Check {
   file: string; serial: string; usable: boolean; refusal: string[]; reasons: string[]; repeat_sides: string[];
-  constants_file: string | null; stored_id: string | null;
+  constants_file: string | null; stored_id: string | null; problem?: string;
 }
 
 function CheckFile({ files, reload, setProblem }: { files: string[]; reload: () => void; setProblem: SetProblem }) {
@@ -92,7 +92,7 @@ function CheckFile({ files, reload, setProblem }: { files: string[]; reload: () 
               })}</ul>
             )}
             {check.usable && !check.stored_id && <button type="button" class="primary" onClick={() => run(true)}>{F.save}</button>}
-            {check.stored_id && <p>{F.saved(check.constants_file ?? '')}</p>}
+            {check.stored_id && <p>{F.saved(check.constants_file ?? '')} {check.problem}</p>}
           </div>
         )}
       </div>

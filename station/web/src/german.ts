@@ -286,7 +286,7 @@ export const DE: Strings = {
     checkText: 'Eine Kalibrierdatei, die ohne dieses Programm aufgezeichnet wurde: Ist jede Seite darin?',
     check: 'Prüfen',
     save: 'Ihre Konstanten speichern',
-    saved: (file) => `Konstanten gespeichert in ${file} und im Speicher.`,
+    saved: (file) => file ? `Konstanten gespeichert in ${file} und im Speicher.` : 'Konstanten gespeichert im Speicher.',
     usable: 'Diese Datei ist brauchbar: Jede Seite ist darin.',
     notUsable: 'Diese Datei ist noch nicht brauchbar.',
     again: (sides) => `Das Gerät lag nicht lange genug still auf ${sides.map(faceName).join(', ')}: Es hat sich bewegt oder lag auf einer anderen Seite. Nur ${sides.length === 1 ? 'diese Seite wird' : 'diese Seiten werden'} noch einmal verlangt; die anderen bleiben.`,

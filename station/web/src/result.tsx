@@ -87,7 +87,8 @@ export function ResultBox({ result, writeNow, printer = null, setProblem }: {
       {result.reasons.map((reason) => <p>{reason}</p>)}
       {typeof result.residual_mg === 'number' && <p>{S.residual(result.residual_mg, result.as_found_residual_mg ?? null)}</p>}
       {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
-      {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
+      {result.kind === 'capture' && result.stored && <p>{S.files.saved(result.problem ? '' : `${result.file}.constants.json`)}</p>}
+      {result.kind === 'capture' && result.problem && <p>{result.problem}</p>}
       {result.run && <Papers run={result.run} documents={result.documents ?? []} />}
       {result.run && setProblem && <PrintedLabel run={result.run} documents={result.documents ?? []} printer={printer} setProblem={setProblem} />}
       {result.quantities && result.quantities.length > 0 && <Values quantities={result.quantities} coverage={result.coverage_factor ?? 2} open={kind === 'bad'} />}

@@ -115,6 +115,7 @@ TEST_F(SolveCommand, AFileThatCannotBeWrittenStopsNotTheStore) {
   const Json stored = run({"history", "MOS2A45130450", "--json", "--store", store}).json();
   ASSERT_EQ(stored["constants"].size(), 1U) << answer.people;
   EXPECT_EQ(answer.json()["stored_id"], stored["constants"][0]["id"]);
+  EXPECT_EQ(answer.json()["error"]["code"], "io");
   EXPECT_EQ(run({"solve", path, "-o", "/dev/full"}).exit_code, 74) << "without the store";
 }
 

@@ -31,6 +31,14 @@ TEST_F(CommandTest, CaptureMakesACalibrationFile) {
   EXPECT_THAT(next_of(capture_into(path("d.gt3x"))),
               testing::ElementsAre("repair", "RECORDINGS", "--calibration-file", path("d.gt3x"),
                                    "-o", "repaired"));
+
+  // A full disk: the constants are in the store all the same.
+  const auto full =
+      run({"capture", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"), "-o",
+           path("e.gt3x"), "--constants-out", "/dev/full", "--json"});
+  EXPECT_EQ(full.exit_code, 74);
+  EXPECT_TRUE(full.json()["stored_id"].is_string());
+  EXPECT_EQ(full.json()["error"]["code"], "io");
 }
 
 TEST_F(CommandTest, CaptureOfCornersStatesItsEfficiency) {

@@ -39,6 +39,25 @@ TEST(WireUnit, IdentifiesAndReadsItsConstants) {
   EXPECT_EQ((*unit)->filter()->recording, FilterConfiguration::current);
 }
 
+// Its files are known by the serial in capitals, and so are its runs and constants.
+TEST(WireUnit, ASerialInSmallLettersIsTheOneOfItsFiles) {
+  Bench bench;
+  Link link = changed(
+      bench.link(), [](Message&) {},
+      [](Message& reply) {
+        if (reply.command == Command::identify) {
+          Identity small = *decode_identity(reply.payload);
+          small.serial = "mos2a45130007";
+          reply.payload = encode_identity(small);
+        }
+      });
+  link.serial = "mos2a45130007";
+  const auto unit = WireUnit::open(std::move(link));
+  ASSERT_OK(unit);
+  EXPECT_EQ((*unit)->identity().serial, "MOS2A45130007");
+  EXPECT_EQ((*unit)->identify()->serial, "MOS2A45130007");
+}
+
 TEST(WireUnit, WritesConstantsAndReadsThemBack) {
   Bench bench;
   auto unit = *WireUnit::open(bench.link());

@@ -28,7 +28,7 @@ struct PracticeCase {
   }
 };
 
-// Every `step`-th of them.
+// The cases of one folder.
 std::vector<PracticeCase> run_all(const char* folder) {
   std::vector<PracticeCase> cases;
   std::ifstream file(tests::shared_file("gap/practice/labels.json"));

@@ -20,12 +20,33 @@ TEST(LaneCapture, RecordsACalibrationFileSideAfterSide) {
   const Json files = station.get("/api/files?path=");
   ASSERT_EQ(files["files"].size(), 1U);
   const std::string name = files["files"][0]["name"];
-  const auto answer =
-      station.client().Post("/api/check", Json{{"file", name}}.dump(), "text/plain");
-  ASSERT_EQ(answer->status, 200) << answer->body;
-  const Json check = Json::parse(answer->body);
+  const auto check_file = [&](bool save) {
+    const Json body = {{"file", name}, {"save", save}};
+    const auto answer = station.client().Post("/api/check", body.dump(), "text/plain");
+    EXPECT_EQ(answer->status, 200) << answer->body;
+    return Json::parse(answer->body);
+  };
+  const Json check = check_file(false);
   EXPECT_EQ(check["usable"], true);
   EXPECT_TRUE(check["repeat_sides"].empty());
+  EXPECT_TRUE(check["constants_file"].is_null());
+  EXPECT_EQ(check_file(true)["constants_file"], name + ".constants.json");
+
+  // The store has the constants all the same, and nobody is told of a file that is not there.
+  {
+    const std::lock_guard lock(station.mutex);
+    station.constants_file_problem = Error{ErrorCode::io, "no space left", name, "make room"};
+  }
+  const Json saved = check_file(true);
+  EXPECT_EQ(saved["stored_id"], "c0ffee");
+  EXPECT_TRUE(saved["constants_file"].is_null());
+  EXPECT_THAT(saved["problem"], HasSubstr("no space left"));
+  EXPECT_EQ(station.post("/api/capture", {{"lane", 1}}), 202);
+  const Json again = station.wait(1, [&](const Json& json) {
+    return json["state"] == "done" && json["result"]["file"] != lane["result"]["file"];
+  })["result"];
+  EXPECT_EQ(again["stored"], true);
+  EXPECT_THAT(again["problem"], HasSubstr("no space left"));
 }
 
 TEST(LaneCapture, ACaptureSurvivesAReplugAndAsksTheSideUnderWayAgain) {

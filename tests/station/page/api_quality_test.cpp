@@ -25,7 +25,7 @@ class ApiQuality : public testing::Test {
     auto lanes = Lanes::open(
         posix_env(), devices_, options,
         [](const JigReport&, const RunLabels&) -> Result<RunInStore> { return RunInStore{}; },
-        [](const CaptureReport&) -> Result<std::string> { return std::string(); });
+        [](const CaptureReport&) { return KeptConstants{}; });
     EXPECT_OK(lanes);
     lanes_ = *std::move(lanes);
     api_ = std::make_unique<Api>(

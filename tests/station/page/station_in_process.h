@@ -63,6 +63,10 @@ class Station {
       return is_withdrawn ? Status(fail(ErrorCode::configuration, "these constants were withdrawn"))
                           : Status();
     };
+    const StoreConstants store_constants = [this](const CaptureReport&) {
+      const std::lock_guard lock(mutex);
+      return KeptConstants{"c0ffee", constants_file_problem};
+    };
     auto opened = Lanes::open(
         posix_env(), registry_, options,
         [this](const JigReport& report, const RunLabels& labels) -> Result<RunInStore> {
@@ -83,7 +87,7 @@ class Station {
           jigs.push_back(labels.jig_id);
           return RunInStore{{"abc123", "def456"}, is_kept_here, {"report.json"}};
         },
-        [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); });
+        store_constants);
     EXPECT_OK(opened);
     lanes = *std::move(opened);
     repairs = std::make_unique<RepairJob>(
@@ -92,17 +96,15 @@ class Station {
     api_options.tls = !server_options.tls_certificate.empty();
     api_options.files_folder = folder;
     api_options.most_streams = most_streams;
-    api = std::make_unique<Api>(
-        api_options,
-        ApiParts{posix_env(),
-                 *lanes,
-                 *repairs,
-                 sign_in,
-                 &practice_bench_,
-                 [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); },
-                 {},
-                 nullptr,
-                 &operators_});
+    api = std::make_unique<Api>(api_options, ApiParts{posix_env(),
+                                                      *lanes,
+                                                      *repairs,
+                                                      sign_in,
+                                                      &practice_bench_,
+                                                      store_constants,
+                                                      {},
+                                                      nullptr,
+                                                      &operators_});
     auto listening = Server::open(posix_env(), *api, server_options);
     EXPECT_OK(listening);
     server = *std::move(listening);
@@ -172,7 +174,8 @@ class Station {
   bool store_refuses = false;               // the record itself
   bool has_defect = false;                  // to store throws
   std::atomic<bool> start_has_defect{false};
-  bool is_kept_here = false;  // the journal has it
+  bool is_kept_here = false;                    // the journal has it
+  std::optional<Error> constants_file_problem;  // the disk takes no FILE.constants.json
 
  private:
   std::shared_ptr<mocks::VirtualBench> bench_;
