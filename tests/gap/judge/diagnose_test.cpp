@@ -283,6 +283,22 @@ bool names(const Diagnosis& d, const std::string& effect) {
                      [&](const EffectFinding& e) { return e.name == effect; });
 }
 
+// A walk of the sensor is about alike in all axes; a supply that couples into one is in no
+// catalogue.
+TEST(Diagnose, AZeroThatSwingsOnOneAxisIsNoRandomWalk) {
+  for (const double period_s : {60.0, 120.0}) {
+    const Bundle bundle = tests::made_production({}, [&](const Segment& segment, double t_s) {
+      const double angle = 2 * M_PI * (segment.host_start_s + t_s) / period_s;
+      return Eigen::Vector3d(segment.rotation.col(2) +
+                             Eigen::Vector3d(0.005 * std::sin(angle), 0, 0));
+    });
+    const auto d = diagnose(bundle);
+    ASSERT_OK(d);
+    EXPECT_TRUE(d->unknown.present) << period_s << ": " << d->brief();
+    EXPECT_FALSE(names(*d, "random_walk")) << period_s << ": " << d->brief();
+  }
+}
+
 // A zero that wanders off: three minutes show that it does, and hardly whether it drifts on or
 // warms up. The likelier one is named with the other beside it, and nothing is unknown.
 TEST(Diagnose, OfTwoThatLookAlikeTheLikelierIsNamed) {
