@@ -367,6 +367,11 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
       {"--jig-due", "2001-01-01", "--jig-exception", "lab closed", "--jig-exception-by", "Eve"});
   EXPECT_EQ(signed_for["verdict"], "pass") << signed_for;
   EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "soon"}).exit_code, 64);
+  EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "2999-01-01", "--jig-exception",
+                     "lab closed"})
+                .exit_code,
+            64)
+      << "who signs? Before the day, too";
 }
 
 // A run that the store did not take is in the journal, and the page says so: no reason for the
