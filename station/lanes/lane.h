@@ -186,6 +186,7 @@ class Lanes::Lane {
   SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
   void continue_capture(const std::stop_token& stop, const UnfinishedCapture& left);
   void end_capture(nlohmann::ordered_json result);
+  void end_capture_with(const Result<CaptureReport>& report, const std::string& serial);
   void end_capture_by(const Error& error, const std::string& serial);
 
   bool stop_requested() const {

@@ -146,9 +146,18 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
   if (!report && stop.stop_requested()) {
     return;  // the next program continues it
   }
-  Json result =
-      report ? result_of(*report) : result_of(report.error(), state.serial, stop_requested());
-  if (report && report->usable()) {
+  end_capture_with(report, state.serial);
+  if (!report && report.error().code == ErrorCode::device_unavailable) {
+    close_unit();
+  }
+}
+
+void Lanes::Lane::end_capture_with(const Result<CaptureReport>& report, const std::string& serial) {
+  if (!report) {
+    return end_capture_by(report.error(), serial);
+  }
+  Json result = result_of(*report);
+  if (report->usable()) {
     const std::lock_guard lock(shared_.store_mutex);
     if (const auto id = shared_.store_constants(*report)) {
       result["stored"] = true;
@@ -158,9 +167,6 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
     }
   }
   end_capture(std::move(result));
-  if (!report && report.error().code == ErrorCode::device_unavailable) {
-    close_unit();
-  }
 }
 
 void Lanes::Lane::end_capture(Json result) {
@@ -188,8 +194,16 @@ void Lanes::Lane::continue_capture(const std::stop_token& stop, const Unfinished
   if (stop.stop_requested()) {
     return;
   }
-  if (!unit) {
+  if (!unit && left.resume.asked_again == 0) {
     return end_capture_by(unit.error(), left.serial);
+  }
+  if (!unit) {
+    CaptureOptions options = shared_.options.capture;
+    options.output = left.output;
+    CaptureReport report;
+    report.serial = left.serial;
+    return end_capture_with(judge_file_of_before(env_, options, report, unit.error().brief()),
+                            left.serial);
   }
   capture(stop, order, left);
 }

@@ -116,7 +116,10 @@ Result<UnfinishedCapture> parse_capture(const Json& json) {
   UnfinishedCapture capture;
   SIXPOINT_CHECK(parse_common(json, capture));
   json.at("output").get_to(capture.output);
-  capture.resume.asked_again = json.value("asked_again", false);  // not in earlier versions
+  // Not in earlier versions, or whether it was.
+  const Json asked_again = json.value("asked_again", Json(0));
+  capture.resume.asked_again =
+      asked_again.is_boolean() ? int{asked_again.get<bool>()} : asked_again.get<int>();
   for (const Json& side : json.at("done")) {
     SIXPOINT_ASSIGN(const auto pose, device::parse_pose(side.at("pose").get<std::string>()));
     capture.resume.done.push_back({pose, side.at("recording").get<std::uint16_t>()});

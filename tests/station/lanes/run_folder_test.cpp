@@ -277,7 +277,7 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   capture.serial = "MOS2A45130007";
   capture.output = "out.gt3x";
   capture.resume.done = {{device::Pose::plus_z, 3}, {device::Pose::minus_x, 4}};
-  capture.resume.asked_again = true;
+  capture.resume.asked_again = 2;
   ASSERT_OK(lane.save_capture(capture));
   const std::string json = text_of_file(folder / "lane/capture.json");
   EXPECT_NE(json.find("\"-x\""), std::string::npos) << json;
@@ -287,12 +287,20 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   ASSERT_EQ((*left)->resume.done.size(), 2U);
   EXPECT_EQ((*left)->resume.done[1].pose, CapturePose(device::Pose::minus_x));
   EXPECT_EQ((*left)->resume.done[1].recording, 4);
-  EXPECT_TRUE((*left)->resume.asked_again);
-  // An earlier version did not write it.
+  EXPECT_EQ((*left)->resume.asked_again, 2);
+  // An earlier version did not write it, and a later one not how often.
   auto old = nlohmann::ordered_json::parse(json);
+  for (const bool is_asked : {true, false}) {
+    old["asked_again"] = is_asked;
+    std::ofstream(folder / "lane/capture.json") << old;
+    EXPECT_EQ((*lane.load_capture())->resume.asked_again, is_asked ? 1 : 0);
+  }
+  old["asked_again"] = "twice";
+  std::ofstream(folder / "lane/capture.json") << old;
+  EXPECT_FAILS(lane.load_capture(), ErrorCode::bad_data);
   old.erase("asked_again");
   std::ofstream(folder / "lane/capture.json") << old;
-  EXPECT_FALSE((*lane.load_capture())->resume.asked_again);
+  EXPECT_EQ((*lane.load_capture())->resume.asked_again, 0);
   ASSERT_OK(lane.clear_capture());
   EXPECT_FALSE(lane.load_capture()->has_value());
 }
