@@ -141,6 +141,10 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
           result_of(state.serial, "refused", {allowed.error().what, allowed.error().hint}));
     }
   }
+  {
+    const std::lock_guard lock(mutex_);
+    forget_unwritten();
+  }
   const auto report = run_capture(on_jig(), env_, options, capture_hooks(stop, state),
                                   left ? std::optional(left->resume) : std::nullopt);
   if (!report && stop.stop_requested()) {

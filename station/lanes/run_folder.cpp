@@ -101,6 +101,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
     run.gravity_m_per_s2 = json["gravity_m_per_s2"].get<double>();
   }
   run.kind = json.value("kind", run.kind);
+  run.constants_id = json.value("constants_id", run.constants_id);
   run.retest = parse_retest(json.value("retest", Json(nullptr)));
   run.rows_bytes = json.value("rows_bytes", run.rows_bytes);
   run.rows_sha256 = json.value("rows_sha256", run.rows_sha256);
@@ -221,6 +222,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
       {"client", run.client},
       {"write", run.write},
       {"kind", run.kind},
+      {"constants_id", run.constants_id},
       {"retest", retest_to_json(run.retest)},
       {"rows_bytes", run.rows_bytes},
       {"rows_sha256", run.rows_sha256},

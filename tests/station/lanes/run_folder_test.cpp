@@ -30,6 +30,7 @@ UnfinishedRun a_run() {
   run.resume.as_found = device::CalibrationPage{};
   run.resume.as_found->constants.zero_lsb = {1, -2, 3};
   run.resume.progress.refusals = 4;
+  run.constants_id = "def456";
   run.resume.write_begun = true;
   run.resume.stream.samples = 1000;
   run.resume.stream.lost_samples = 12;
@@ -68,7 +69,8 @@ TEST(RunFolder, ABadRunSetsAsideItselfAndItsSamplesAlone) {
   EXPECT_FALSE((*lane.load_capture()).has_value());
 }
 
-// A folder of an earlier version has no `stream`, no `write_begun` and no `kind`.
+// A folder of an earlier version has no `stream`, no `write_begun`, no `kind` and no id of
+// constants.
 TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");
@@ -77,11 +79,13 @@ TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   json.erase("stream");
   json.erase("write_begun");
   json.erase("kind");
+  json.erase("constants_id");
   std::ofstream(folder / "lane/run.json") << json.dump();
   const auto left = lane.load();
   ASSERT_OK(left);
   EXPECT_FALSE((*left)->resume.write_begun);
   EXPECT_EQ((*left)->kind, "jig");
+  EXPECT_EQ((*left)->constants_id, "");
   EXPECT_EQ((*left)->resume.stream.samples, 0U);
 }
 
@@ -107,6 +111,7 @@ TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
   EXPECT_EQ(run.operator_name, "Łukasz");
   EXPECT_EQ(run.filter, calib::FilterConfiguration::legacy);
   EXPECT_TRUE(run.write);
+  EXPECT_EQ(run.constants_id, "def456");
   EXPECT_TRUE(run.resume.write_begun);
   EXPECT_EQ(run.resume.stream.samples, 1000U);
   EXPECT_EQ(run.resume.stream.lost_samples, 12U);
