@@ -13,6 +13,7 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
+#include "db/journal.h"
 #include "db/records.h"
 #include "gt3x/forms/model.h"
 #include "repair/rescale/applying_constants.h"
@@ -115,9 +116,9 @@ std::vector<std::string> with_store(std::vector<std::string> words, const std::s
   return words;
 }
 
-Result<db::Saved> keep_records(Context& context, const std::string& location,
-                               Result<db::Store>& store,
-                               const std::function<Status(db::RecordWriter&)>& work) {
+namespace {
+
+db::SavePlaces save_places(const std::string& location) {
   db::SavePlaces places;
   places.journal = journal_folder(location);
   const std::string name = "/sixpoint-journal-" + store_name(location);
@@ -126,6 +127,27 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
     places.last_resorts.push_back(folder.string() + name);
   }
+  return places;
+}
+
+}  // namespace
+
+Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id) {
+  db::SavePlaces places = save_places(location);
+  places.last_resorts.push_back(places.journal);
+  for (const std::string& folder : places.last_resorts) {
+    SIXPOINT_ASSIGN(const bool is_there, db::Journal::holds(files, folder, id));
+    if (is_there) {
+      return true;
+    }
+  }
+  return false;
+}
+
+Result<db::Saved> keep_records(Context& context, const std::string& location,
+                               Result<db::Store>& store,
+                               const std::function<Status(db::RecordWriter&)>& work) {
+  const db::SavePlaces places = save_places(location);
   auto kept = db::save(context.env.files, store, places, work);
   if (!kept || kept->in_store()) {
     if (kept && kept->caught_up > 0) {

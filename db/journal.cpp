@@ -139,6 +139,16 @@ Result<std::size_t> Journal::pending() {
   return entries().map([](const auto& names) { return names.size(); });
 }
 
+Result<bool> Journal::holds(FileSystem& files, const std::string& folder, const std::string& id) {
+  if (!files.info(folder)) {
+    return false;
+  }
+  SIXPOINT_ASSIGN(const auto names, Journal(files, folder).entries());
+  return std::any_of(names.begin(), names.end(), [ending = "-" + id + ".json"](const auto& name) {
+    return name.ends_with(ending);
+  });
+}
+
 Result<std::string> Journal::add(NewRows rows) {
   SIXPOINT_ASSIGN(const auto names, entries());
   std::uint64_t last = 0;

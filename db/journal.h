@@ -32,6 +32,8 @@ class Journal final : public RecordWriter {
   Result<std::string> add(NewRows rows) override;
 
   Result<std::size_t> pending();
+  // Whether the record of this id waits in `folder`, which need not be there.
+  static Result<bool> holds(FileSystem& files, const std::string& folder, const std::string& id);
 
   // How many entries the store took. Stops at the first that it does not take, and leaves it and
   // all later ones: order stays. bad_data naming the file for an entry that is damaged.

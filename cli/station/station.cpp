@@ -98,10 +98,12 @@ class StationStore {
     auto store = open_store(context_, options_.store);
     return guard_.may_start(store, serial, options_.station);
   }
-  Status may_write(const station::WaitingConstants& waiting) {
+  Result<std::optional<Error>> may_write(const station::WaitingConstants& waiting) {
     const std::lock_guard lock(mutex_);
+    SIXPOINT_ASSIGN(const bool is_kept_beside,
+                    cli::is_kept_beside(context_.env.files, options_.store, waiting.id));
     auto store = open_existing_store(context_, options_.store);
-    return station::may_write(store, waiting.serial, waiting.id, waiting.are_kept_here);
+    return station::may_write(store, waiting.serial, waiting.id, is_kept_beside);
   }
   Result<station::RunInStore> add_run(const station::JigReport& measured,
                                       const station::RunLabels& labels);

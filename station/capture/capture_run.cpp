@@ -183,6 +183,17 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   return report;
 }
 
+Result<CaptureReport> judge_file_of_before(Env& env, const CaptureOptions& options,
+                                           CaptureReport report, const std::string& why) {
+  if (report.file.empty()) {  // an earlier program made and judged it
+    SIXPOINT_ASSIGN(report.file_sha256, file_sha256(env.files, options.output));
+    report.file = options.output;
+    SIXPOINT_CHECK(check_and_solve(env, options, options.output, std::nullopt, report));
+  }
+  report.notes.push_back("no side was repeated, the recording of before is judged: " + why);
+  return report;
+}
+
 namespace {
 
 class CaptureRun {
@@ -206,6 +217,22 @@ class CaptureRun {
     }
     report_.serial = unit().identity().serial;
     report_.firmware = unit().identity().firmware;
+    if (resume) {
+      progress_ = *resume;
+    }
+    auto done = record_and_judge(resume.has_value());
+    // `internal`: the program ends, and a later one goes on.
+    if (done || progress_.asked_again == 0 || done.error().code == ErrorCode::internal) {
+      return done;
+    }
+    // A side that cannot be repeated takes nothing away from what was recorded before.
+    return judge_file_of_before(env_, options_, std::move(report_), done.error().brief());
+  }
+
+ private:
+  enum class Step { done, stopped, away };
+
+  Result<CaptureReport> record_and_judge(bool goes_on) {
     SIXPOINT_ASSIGN(const device::FilterState filter, unit().filter());
     report_.recording_filter = filter.recording;
     report_.refusal =
@@ -213,9 +240,8 @@ class CaptureRun {
     if (!report_.refusal.empty()) {
       return report_;
     }
-    if (resume) {
-      progress_ = *resume;
-      if (progress_.asked_again) {
+    if (goes_on) {
+      if (progress_.asked_again > 0) {
         remove_beside();
       }
       SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
@@ -224,7 +250,7 @@ class CaptureRun {
       progress_.started = unit().clock().now();
       SIXPOINT_CHECK(begin_recording());
     }
-    for (int repeats = 0;; ++repeats) {
+    for (;;) {
       const Result<bool> all_sides = record_sides();
       if (!all_sides && (gone_ || all_sides.error().code == ErrorCode::internal)) {
         return fail(all_sides.error());  // the unit records on
@@ -233,36 +259,28 @@ class CaptureRun {
       if (ended && !all_sides) {
         ended = fail(all_sides.error());
       }
-      if (progress_.asked_again && (!ended || !*all_sides)) {
-        return judged_as_it_is(ended ? "it was stopped" : ended.error().brief());
-      }
       SIXPOINT_CHECK(ended);
       if (!*all_sides) {
+        if (progress_.asked_again > 0) {
+          return judge_file_of_before(env_, options_, std::move(report_), "it was stopped");
+        }
         report_.stopped = true;
         return report_;
       }
-      const Status fetched = progress_.asked_again ? fetch_anew() : fetch(options_.output);
-      if (!fetched && progress_.asked_again && fetched.error().code != ErrorCode::internal) {
-        return judged_as_it_is(fetched.error().brief());
-      }
-      SIXPOINT_CHECK(fetched);
+      SIXPOINT_CHECK(progress_.asked_again > 0 ? fetch_anew() : fetch(options_.output));
       if (!report_.refusal.empty()) {
         return report_;
       }
-      const auto sides = hooks_.again && may_make_pieces()
-                             ? sides_to_repeat(*report_.solved, repeats, options_.most_repeats)
-                             : std::vector<device::Pose>();
+      const auto sides =
+          hooks_.again && may_make_pieces()
+              ? sides_to_repeat(*report_.solved, progress_.asked_again, options_.most_repeats)
+              : std::vector<device::Pose>();
       if (sides.empty()) {
         return report_;
       }
-      if (const Status asked = ask_again(sides); !asked) {
-        return judged_as_it_is(asked.error().brief());
-      }
+      SIXPOINT_CHECK(ask_again(sides));
     }
   }
-
- private:
-  enum class Step { done, stopped, away };
 
   device::Unit& unit() { return *on_jig_.unit; }
   // Null where the jig cannot.
@@ -331,17 +349,6 @@ class CaptureRun {
     return begin_recording();
   }
 
-  // A side that cannot be repeated takes nothing away from what was recorded before.
-  Result<CaptureReport> judged_as_it_is(const std::string& why) {
-    if (report_.file.empty()) {  // an earlier program made and judged it
-      SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, options_.output));
-      report_.file = options_.output;
-      SIXPOINT_CHECK(check_and_solve(env_, options_, options_.output, std::nullopt, report_));
-    }
-    report_.notes.push_back("no side was repeated, the recording of before is judged: " + why);
-    return report_;
-  }
-
   // The sides are recorded anew, in a recording of their own; the others stay as they are.
   Status ask_again(const std::vector<device::Pose>& sides) {
     std::string names;
@@ -353,7 +360,7 @@ class CaptureRun {
     }
     report_.notes.push_back(
         fmt::format("too few still readings with {} up: asked for again", names));
-    progress_.asked_again = true;
+    ++progress_.asked_again;
     SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
     hooks_.again(sides);
     return {};

@@ -63,10 +63,10 @@ struct CaptureResume {
   };
   UtcTime started{};
   std::vector<Side> done;
-  // Sides were asked for again. So the output is there, and stays until the new one is whole. No
-  // other file had the names of pieces and of the second download then ("c-1.gt3x", "c-new.gt3x",
-  // "c-new-1.gt3x" ... for "c.gt3x"), so those that have them now are this capture's.
-  bool asked_again = false;
+  // How often sides were asked for again. Above 0 the output is there, and stays until the new one
+  // is whole. No other file had the names of pieces and of the second download then ("c-1.gt3x",
+  // "c-new.gt3x", "c-new-1.gt3x" ... for "c.gt3x"), so those that have them now are this capture's.
+  int asked_again = 0;
 };
 
 enum class SideAnswer {
@@ -122,9 +122,14 @@ struct CaptureReport {
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env, const CaptureOptions& options);
 
 // device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made;
-// internal after SideAnswer::leave.
+// internal after SideAnswer::leave, and where `reopen` says so: a later program goes on. Any other
+// error leaves the file of before, judged, where sides were asked for again.
 Result<CaptureReport> run_capture(UnitOnJig on_jig, Env& env, const CaptureOptions& options,
                                   const CaptureHooks& hooks,
                                   const std::optional<CaptureResume>& resume = {});
+
+// A capture that asked for sides again and does not go on, for `why`: the file of before is judged.
+Result<CaptureReport> judge_file_of_before(Env& env, const CaptureOptions& options,
+                                           CaptureReport report, const std::string& why);
 
 }  // namespace sixpoint::station

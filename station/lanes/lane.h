@@ -57,9 +57,13 @@ class Lanes::Lane {
   // | the lane's last run                          | since then               | "write now"       |
   // |----------------------------------------------|--------------------------|-------------------|
   // | passed, and began no write                   | nothing, or its unit was | written, read     |
-  // |                                              | pulled out and is back   | back and measured |
+  // |                                              | pulled out and is back,  | back and measured |
+  // |                                              | or a start was refused   |                   |
   // | passed, and began no write                   | another unit was here, a | conflict          |
-  // |                                              | start, or a restart      |                   |
+  // |                                              | run or a capture began,  |                   |
+  // |                                              | or a restart             |                   |
+  // | passed, and began no write                   | its constants were found | conflict          |
+  // |                                              | withdrawn (may_write())  |                   |
   // | began a write                                | any                      | conflict          |
   // | did not pass, or there is none               | any                      | conflict          |
   LaneAnswer<void> start(const StartOrder& order, bool capture);
@@ -163,7 +167,7 @@ class Lanes::Lane {
   Result<RetestState> check_start(const std::string& serial);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
   void on_action(const JigAction& action);
-  Status check_write();
+  Status check_write(const UnfinishedRun& run);
   void end_without_report(const std::string& serial, const Error& error);
   void end_unmeasured(const std::string& serial, const char* verdict,
                       std::vector<std::string> reasons, std::string message);
@@ -186,6 +190,7 @@ class Lanes::Lane {
   SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
   void continue_capture(const std::stop_token& stop, const UnfinishedCapture& left);
   void end_capture(nlohmann::ordered_json result);
+  void end_capture_with(const Result<CaptureReport>& report, const std::string& serial);
   void end_capture_by(const Error& error, const std::string& serial);
 
   bool stop_requested() const {
@@ -215,6 +220,11 @@ class Lanes::Lane {
   void drop_order(const std::optional<std::string>& present);
   // The unit leaves: what waits for it is dropped.
   void drop_what_waits();
+  // No constants wait to be written any more. On the lane's thread.
+  void forget_unwritten() {
+    unwritten_.reset();
+    unwritten_serial_.clear();
+  }
   void add_log(std::string kind, std::string text);
   void set_state(LaneState state, std::string message);
   void set_done(nlohmann::ordered_json result, std::string message);
@@ -238,16 +248,16 @@ class Lanes::Lane {
     std::string never_again = {};
   };
   std::optional<Unstored> unstored_;
-  // The last run, where it passed and nothing was written, for write_last().
+  // The last run, where it passed and nothing was written, for write_last(). Without the id of its
+  // constants as long as there is no record of them.
   std::optional<UnfinishedRun> unwritten_;
-  WaitingConstants waiting_;  // its constants; without an id as long as there is no record of them
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;
   std::unique_ptr<device::Unit> unit_;  // made and ended by the thread; others may cancel()
   device::Unit* opening_ = nullptr;     // the same, before it is unit_
   bool is_unstored_ = false;            // the store did not take the last run yet
-  std::string unwritten_serial_;        // whose constants may be written now; empty: none
+  std::string unwritten_serial_;        // of unwritten_; empty: none
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;

@@ -141,14 +141,27 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
           result_of(state.serial, "refused", {allowed.error().what, allowed.error().hint}));
     }
   }
+  {
+    const std::lock_guard lock(mutex_);
+    forget_unwritten();
+  }
   const auto report = run_capture(on_jig(), env_, options, capture_hooks(stop, state),
                                   left ? std::optional(left->resume) : std::nullopt);
   if (!report && stop.stop_requested()) {
     return;  // the next program continues it
   }
-  Json result =
-      report ? result_of(*report) : result_of(report.error(), state.serial, stop_requested());
-  if (report && report->usable()) {
+  end_capture_with(report, state.serial);
+  if (!report && report.error().code == ErrorCode::device_unavailable) {
+    close_unit();
+  }
+}
+
+void Lanes::Lane::end_capture_with(const Result<CaptureReport>& report, const std::string& serial) {
+  if (!report) {
+    return end_capture_by(report.error(), serial);
+  }
+  Json result = result_of(*report);
+  if (report->usable()) {
     const std::lock_guard lock(shared_.store_mutex);
     const auto stored = shared_.store_constants(*report);
     if (stored) {
@@ -160,9 +173,6 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
     }
   }
   end_capture(std::move(result));
-  if (!report && report.error().code == ErrorCode::device_unavailable) {
-    close_unit();
-  }
 }
 
 void Lanes::Lane::end_capture(Json result) {
@@ -190,8 +200,16 @@ void Lanes::Lane::continue_capture(const std::stop_token& stop, const Unfinished
   if (stop.stop_requested()) {
     return;
   }
-  if (!unit) {
+  if (!unit && left.resume.asked_again == 0) {
     return end_capture_by(unit.error(), left.serial);
+  }
+  if (!unit) {
+    CaptureOptions options = shared_.options.capture;
+    options.output = left.output;
+    CaptureReport report;
+    report.serial = left.serial;
+    return end_capture_with(judge_file_of_before(env_, options, report, unit.error().brief()),
+                            left.serial);
   }
   capture(stop, order, left);
 }

@@ -125,6 +125,9 @@ Json Lanes::Lane::to_json() const {
     }
   }
   json["result"] = result_;
+  if (!unwritten_serial_.empty() && result_.is_object() && result_["serial"] == unwritten_serial_) {
+    json["result"]["can_write"] = true;
+  }
   json["log"] = Json::array();
   for (const LogLine& line : log_) {
     json["log"].push_back(

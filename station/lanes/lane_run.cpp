@@ -88,15 +88,13 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                  });
   const UnfinishedRun& state = saver.state();
   session.filter = state.filter;
-  const auto allowed = check_start(state.serial);
-  if (!allowed && left && !order.last_run) {
-    return end_interrupted(*left, "interrupted: " + allowed.error().brief(), allowed.error().code);
-  }
+  const auto allowed = check_write(state).and_then([&] { return check_start(state.serial); });
   if (!allowed) {
-    return end_refused(state.serial, allowed.error());
+    const Error& why = allowed.error();
+    return left && !order.last_run ? end_interrupted(*left, "interrupted: " + why.brief(), why.code)
+                                   : end_refused(state.serial, why);
   }
   if (order.last_run) {
-    unwritten_.reset();
     // For a program that goes on with it: the store has this run's samples, and their file is gone.
     static_cast<void>(folder_.append(left->resume.raw_csv));
   }
@@ -111,6 +109,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   last_accepted_ = env_.clock.elapsed();
   {
     const std::lock_guard lock(mutex_);
+    forget_unwritten();
     if (!run_) {
       run_.emplace();
     }
@@ -139,11 +138,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
-    waiting_ = {state.serial};
     last.resume = {run_->progress, report->started, report->as_found, {},
                    false,          report->stream,  report->raw_csv};
     unwritten_serial_ = state.serial;
-    result_["can_write"] = true;
   }
   result_["verdict_ms"] =
       std::chrono::duration<double, std::milli>(env_.clock.elapsed() - last_accepted_).count();
@@ -155,13 +152,6 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
 
 void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& order) {
   UnfinishedRun left = *unwritten_;
-  if (const Status good = check_write(); !good) {
-    const ErrorCode code = good.error().code;
-    if (code == ErrorCode::configuration || code == ErrorCode::no_input) {
-      unwritten_.reset();  // withdrawn, or not in the store: so it stays
-    }
-    return end_refused(left.serial, good.error());
-  }
   left.operator_name = both_names(left.operator_name, order.operator_name);
   left.is_authenticated = left.is_authenticated && order.is_authenticated;
   left.client = order.client;
@@ -194,13 +184,26 @@ UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfigu
   return run;
 }
 
-// An error where the constants that wait were withdrawn, or the store cannot say so.
-Status Lanes::Lane::check_write() {
-  if (!shared_.options.may_write || waiting_.id.empty()) {
+// An error where `run` is to write constants of an earlier one ("write now") that are written no
+// more, or the store does not answer: then they wait on. What is in the unit already is measured,
+// whatever became of it.
+Status Lanes::Lane::check_write(const UnfinishedRun& run) {
+  if (!shared_.options.may_write || run.kind != kWriteKind || run.resume.written) {
     return {};
   }
-  const std::lock_guard lock(shared_.store_mutex);
-  return shared_.options.may_write(waiting_);
+  const auto never = [&]() -> Result<std::optional<Error>> {
+    const std::lock_guard lock(shared_.store_mutex);
+    return shared_.options.may_write({run.serial, run.constants_id});
+  }();
+  if (!never) {
+    return fail(never.error());
+  }
+  if (!*never) {
+    return {};
+  }
+  const std::lock_guard lock(mutex_);
+  forget_unwritten();
+  return fail(**never);
 }
 
 // An error where the station is locked, its jig is overdue or the unit failed too often: an engineer
@@ -299,11 +302,6 @@ void Lanes::Lane::end_unmeasured(const std::string& serial, const char* verdict,
 // Constants that wait, wait on: what the refusal is about may be put right.
 void Lanes::Lane::end_refused(const std::string& serial, const Error& error) {
   end_unmeasured(serial, "refused", {error.what, error.hint}, error.brief());
-  const std::lock_guard lock(mutex_);
-  if (unwritten_ && unwritten_->serial == serial) {
-    unwritten_serial_ = serial;
-    result_["can_write"] = true;
-  }
 }
 
 void Lanes::Lane::show_result(const JigReport& report, const RunLabels& labels) {
@@ -370,9 +368,8 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
             stored->ids.constants_id ? Json(*stored->ids.constants_id) : Json(nullptr);
         result_.erase("problem");
       }
-      if (unwritten_ && unstored_->labels.kind != kWriteKind) {
-        waiting_.id = stored->ids.constants_id.value_or("");
-        waiting_.are_kept_here = stored->is_kept_here;
+      if (unwritten_ && unwritten_->constants_id.empty()) {
+        unwritten_->constants_id = stored->ids.constants_id.value_or("");
       }
       unstored_.reset();
       is_unstored_ = false;
@@ -394,15 +391,13 @@ bool Lanes::Lane::set_aside_result() {
            : fmt::format("{}; it is not set aside yet: {}", why, kept.error().brief());
   if (result_.is_object() && result_["serial"] == unstored_->report.serial) {
     result_["problem"] = problem;
-    result_.erase("can_write");
   }
   add_log("problem", problem);
   is_unstored_ = !kept;
+  // Constants of which there is no record are not written, also where it was asked meanwhile.
+  forget_unwritten();
   if (kept) {
     unstored_.reset();
-    // Constants of which there is no record are not written, also where it was asked meanwhile.
-    unwritten_.reset();
-    unwritten_serial_.clear();
     if (order_ && order_->start.last_run) {
       order_.reset();
       add_log("problem", "not started: there is no record of the run whose constants wait");

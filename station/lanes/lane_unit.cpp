@@ -139,7 +139,6 @@ std::optional<Lanes::Lane::Order> Lanes::Lane::next_order() {
   commands_.clear();
   if (order) {
     write_ = order->start.write;
-    unwritten_serial_.clear();
     result_ = nullptr;
     run_.reset();
     log_.clear();
@@ -230,7 +229,7 @@ bool Lanes::Lane::open_unit() {
       // What came out of the one before stays to be read until the next start; its constants are
       // for its own unit alone.
       run_.reset();
-      unwritten_serial_.clear();
+      forget_unwritten();
       std::erase_if(log_, [](const LogLine& line) { return line.kind != "problem"; });
     }
     readings_.clear();

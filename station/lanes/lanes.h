@@ -65,12 +65,11 @@ using StartCheck = std::function<Result<RetestState>(const std::string& serial)>
 // Constants of a run that passed and was not written.
 struct WaitingConstants {
   std::string serial;
-  std::string id = {};
-  bool are_kept_here = false;  // as RunInStore::is_kept_here
+  std::string id;
 };
-// Before they are written: are they still good? On an error nothing is written, and the operator
-// reads why. May be empty.
-using WriteCheck = std::function<Status(const WaitingConstants&)>;
+// Before they are written: may they be (may_write() of station_records.h)? Answers with why they
+// are written no more, or with nothing. On an error they wait on. May be empty.
+using WriteCheck = std::function<Result<std::optional<Error>>(const WaitingConstants&)>;
 // What became of the constants of a calibration file.
 struct KeptConstants {
   std::string id;                     // in the store

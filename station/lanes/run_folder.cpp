@@ -101,6 +101,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
     run.gravity_m_per_s2 = json["gravity_m_per_s2"].get<double>();
   }
   run.kind = json.value("kind", run.kind);
+  run.constants_id = json.value("constants_id", run.constants_id);
   run.retest = parse_retest(json.value("retest", Json(nullptr)));
   run.rows_bytes = json.value("rows_bytes", run.rows_bytes);
   run.rows_sha256 = json.value("rows_sha256", run.rows_sha256);
@@ -116,7 +117,10 @@ Result<UnfinishedCapture> parse_capture(const Json& json) {
   UnfinishedCapture capture;
   SIXPOINT_CHECK(parse_common(json, capture));
   json.at("output").get_to(capture.output);
-  capture.resume.asked_again = json.value("asked_again", false);  // not in earlier versions
+  // Not in earlier versions, or whether it was.
+  const Json asked_again = json.value("asked_again", Json(0));
+  capture.resume.asked_again =
+      asked_again.is_boolean() ? int{asked_again.get<bool>()} : asked_again.get<int>();
   for (const Json& side : json.at("done")) {
     SIXPOINT_ASSIGN(const auto pose, device::parse_pose(side.at("pose").get<std::string>()));
     capture.resume.done.push_back({pose, side.at("recording").get<std::uint16_t>()});
@@ -218,6 +222,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
       {"client", run.client},
       {"write", run.write},
       {"kind", run.kind},
+      {"constants_id", run.constants_id},
       {"retest", retest_to_json(run.retest)},
       {"rows_bytes", run.rows_bytes},
       {"rows_sha256", run.rows_sha256},

@@ -35,6 +35,9 @@ struct UnfinishedRun {
   std::string client = {};
   bool write = false;
   std::string kind = "jig";  // or kWriteKind (run_records.h)
+  // Of the run's constants, for a run of kWriteKind that writes them. Empty as long as there is no
+  // record of them, and in folders of earlier versions.
+  std::string constants_id = {};
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
   std::string jig = {};  // JigReport::jig; empty in folders of earlier versions

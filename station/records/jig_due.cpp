@@ -26,6 +26,10 @@ Result<JigDue> parse_jig_due(const std::string& due, const std::string& exceptio
     }
     jig.due = *date;
   }
+  if (!exception.empty() && signed_by.empty()) {
+    return fail(ErrorCode::usage, "an exception for the jig has a name", "--jig-exception",
+                "say who signs for it with --jig-exception-by NAME");
+  }
   return jig;
 }
 
@@ -40,10 +44,6 @@ Status check_jig_due(const JigDue& jig, UtcTime now) {
                 {},
                 "have it calibrated; or an engineer signs: --jig-exception WHY "
                 "--jig-exception-by NAME");
-  }
-  if (jig.signed_by.empty()) {
-    return fail(ErrorCode::usage, "an exception for the jig has a name", "--jig-exception",
-                "say who signs for it with --jig-exception-by NAME");
   }
   return {};
 }

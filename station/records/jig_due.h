@@ -1,13 +1,15 @@
 // The jig is calibrated too: after its due date no run passes, unless an engineer signed for it.
 //
-//   SIXPOINT_CHECK(check_jig_due({due, "the laboratory is closed", "Eve"}, env.clock.now()));
+//   SIXPOINT_ASSIGN(const JigDue jig, parse_jig_due("2027-03-31", "laboratory closed", "Eve"));
+//   SIXPOINT_CHECK(check_jig_due(jig, env.clock.now()));
 //
 // | due date         | exception | signed by | answer                                           |
 // |------------------|-----------|-----------|--------------------------------------------------|
+// | any              | a reason  | no one    | usage error of parse_jig_due(): an exception has |
+// |                  |           |           | a name, also before it is needed                 |
 // | not known        | any       | any       | the unit may be measured                         |
 // | that day, before | any       | any       | the unit may be measured                         |
 // | a day before     | none      | any       | configuration error: nothing is measured         |
-// | a day before     | a reason  | no one    | usage error: an exception has a name             |
 // | a day before     | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
 // |                  |           |           | into the run's record                            |
 //
@@ -30,10 +32,11 @@ namespace sixpoint::station {
 struct JigDue {
   std::optional<UtcTime> due;
   std::string exception;  // why it may be used all the same; empty: it may not
-  std::string signed_by;  // the engineer's name
+  std::string signed_by;  // the engineer's name; not empty where there is an exception
 };
 
-// `due` as a person writes it ("2027-03-31"), or empty; usage where it is no date.
+// `due` as a person writes it ("2027-03-31"), or empty; usage where it is no date, or where no one
+// signs for the exception.
 Result<JigDue> parse_jig_due(const std::string& due, const std::string& exception,
                              const std::string& signed_by);
 Status check_jig_due(const JigDue& jig, UtcTime now);

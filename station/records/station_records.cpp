@@ -442,23 +442,22 @@ Result<std::string> add_decision(db::Store& store, const db::StationEvent& decis
   return store.add_station_event(decision);
 }
 
-Status may_write(Result<db::Store>& store, const std::string& serial,
-                 const std::string& constants_id, bool is_kept_here) {
+Result<std::optional<Error>> may_write(Result<db::Store>& store, const std::string& serial,
+                                       const std::string& constants_id, bool is_in_journal) {
   const auto found = store ? store->unit_history(serial) : fail(store.error());
-  if (!found) {
-    return is_kept_here ? Status() : fail(found.error());
+  if (!found && !is_in_journal) {
+    return fail(found.error());
   }
-  const db::UnitHistory& history = *found;
+  const db::UnitHistory history = found.value_or(db::UnitHistory());
   if (std::ranges::find(history.constants, constants_id, &db::ConstantsRecord::id) ==
       history.constants.end()) {
-    if (is_kept_here) {
-      return {};
-    }
-    return fail(ErrorCode::no_input, "the store does not hold these constants",
-                db::shown_id(constants_id), "measure the unit again");
+    return is_in_journal
+               ? std::nullopt
+               : std::optional(Error{ErrorCode::no_input, "the store does not hold these constants",
+                                     db::shown_id(constants_id), "measure the unit again"});
   }
   if (!history.is_withdrawn(constants_id)) {
-    return {};
+    return std::nullopt;
   }
   std::string why;
   for (const db::Correction& correction : history.corrections) {
@@ -466,9 +465,9 @@ Status may_write(Result<db::Store>& store, const std::string& serial,
       why = correction.reason;
     }
   }
-  return fail(ErrorCode::configuration,
-              fmt::format("these constants were withdrawn: {}", printable(why, 200)),
-              db::shown_id(constants_id), "measure the unit again");
+  return Error{ErrorCode::configuration,
+               fmt::format("these constants were withdrawn: {}", printable(why, 200)),
+               db::shown_id(constants_id), "measure the unit again"};
 }
 
 Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::string& study,

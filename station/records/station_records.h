@@ -112,17 +112,19 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
 
 // May the constants of a run be written into their unit now ("write now")? The store took them when
 // the run ended, or they were kept in the journal, which goes into the store when that answers.
+// The answer is why they are written no more, or nothing: they may be. An error is no answer: they
+// wait on. `is_in_journal`: the journal holds them now, as it was seen before `store` was opened.
 //
-//   constants                                  kept where  answer
-//   of the store, and not withdrawn            any         yes
-//   withdrawn (db::UnitHistory::is_withdrawn)  any         configuration error, with the reason of
-//                                                          who did it
-//   not of this store                          store       no_input error
-//   not of this store                          journal     yes: nobody can have withdrawn them
-//   the store does not answer                  store       its error
-//   the store does not answer                  journal     yes, likewise
-Status may_write(Result<db::Store>& store, const std::string& serial,
-                 const std::string& constants_id, bool is_kept_here);
+//   constants                                  in journal  answer
+//   of the store, and not withdrawn            any         they may be
+//   withdrawn (db::UnitHistory::is_withdrawn)  any         no more, with the reason of who did it
+//   not of this store                          no          no more
+//   not of this store                          yes         they may be: only what is in the store
+//                                                          can be withdrawn
+//   the store does not answer                  no          its error, whatever code it has
+//   the store does not answer                  yes         they may be, likewise
+Result<std::optional<Error>> may_write(Result<db::Store>& store, const std::string& serial,
+                                       const std::string& constants_id, bool is_in_journal);
 
 // The two configuration errors, with what lifts them.
 Error station_is_locked(const std::string& why, const std::string& station);

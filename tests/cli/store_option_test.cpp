@@ -99,6 +99,7 @@ class RefusingStore : public StoreTest {
     EXPECT_EQ(json["kept"]["folder"], cli::journal_folder(store));
     auto journal = db::Journal::open(posix_env().files, cli::journal_folder(store)).value();
     EXPECT_GE(journal.pending().value(), 2U) << "the run and its constants";
+    EXPECT_TRUE(cli::is_kept_beside(posix_env().files, store, json["stored_id"]).value());
   }
 };
 
@@ -123,7 +124,9 @@ TEST_F(RefusingStore, ANewerADamagedAndAMissingPlaceLoseNoRun) {
       run({"history", "MOS2A45130007", "--store", path("none/store.db"), "--json"}).json();
   ASSERT_EQ(history["runs"].size(), 2U);
   EXPECT_EQ(history["runs"][0]["id"], missing.json()["run"]);
-  EXPECT_EQ(history["constants"][0]["id"], missing.json()["stored_id"]);
+  const std::string constants_id = missing.json()["stored_id"];
+  EXPECT_EQ(history["constants"][0]["id"], constants_id);
+  EXPECT_FALSE(cli::is_kept_beside(posix_env().files, path("none/store.db"), constants_id).value());
   EXPECT_EQ(run({"audit", "verify", "--store", path("none/store.db")}).exit_code, 0);
 }
 

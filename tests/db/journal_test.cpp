@@ -139,6 +139,24 @@ TEST_F(JournalTest, APowerCutAtAnyOperationLosesAndDoublesNothing) {
   }
 }
 
+TEST_F(JournalTest, SaysWhetherItHoldsARecord) {
+  const auto holds = [&](const std::string& id) {
+    return Journal::holds(memory_.files, "journal", id).value();
+  };
+  const std::string id(32, 'a');
+  EXPECT_FALSE(holds(id)) << "and makes no folder";
+  EXPECT_FALSE(memory_.files.info("journal"));
+  Journal journal = open_journal();
+  const auto added = journal.add_constants(constants(1, ""), "w");
+  ASSERT_OK(added);
+  EXPECT_TRUE(holds(*added));
+  EXPECT_FALSE(holds(id));
+  EXPECT_FALSE(holds(""));
+  Store store = open_store("late");
+  ASSERT_OK(journal.catch_up(store));
+  EXPECT_FALSE(holds(*added)) << "the store has it now";
+}
+
 TEST_F(JournalTest, KeepsTheOrderWhenAnEntryIsDamagedOrRefused) {
   Journal journal = open_journal();
   ASSERT_OK(journal.add_constants(constants(1, ""), "w"));

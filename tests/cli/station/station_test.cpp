@@ -367,10 +367,15 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
       {"--jig-due", "2001-01-01", "--jig-exception", "lab closed", "--jig-exception-by", "Eve"});
   EXPECT_EQ(signed_for["verdict"], "pass") << signed_for;
   EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "soon"}).exit_code, 64);
+  EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "2999-01-01", "--jig-exception",
+                     "lab closed"})
+                .exit_code,
+            64)
+      << "who signs? Before the day, too";
 }
 
 // A run that the store did not take is in the journal, and the page says so: no reason for the
-// station to end with an error.
+// station to end with an error. Its constants are written while the journal has them.
 TEST_F(StationCommand, ARunInTheJournalDoesNotChangeHowItEnds) {
   ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
   Child station(arguments({"--port", "0", "--device", "virtual:seed=7,jig=auto"}));
@@ -387,6 +392,29 @@ TEST_F(StationCommand, ARunInTheJournalDoesNotChangeHowItEnds) {
     result = lane(port)["result"];
   }
   EXPECT_EQ(result.value("kept_here", false), true) << result;
+  // As where another program gave the journal to the store, and the store is away again: there they
+  // may have been withdrawn.
+  const auto write_now = [&](const std::string& verdict, bool written) {
+    const std::string body = R"({"last_run":true})";
+    const std::string more =
+        head() + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
+    EXPECT_THAT(get(port, "/api/run", more, "POST"), StartsWith("HTTP/1.1 202"));
+    const auto is_done = [&] {
+      result = lane(port)["result"];
+      return result.is_object() && result["verdict"] == verdict &&
+             result.value("written", false) == written;
+    };
+    for (int i = 0; i < 600 && !is_done(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    EXPECT_EQ(result["verdict"], verdict) << result;
+  };
+  std::filesystem::rename(path("data/sixpoint/journal"), path("given"));
+  write_now("refused", false);
+  EXPECT_THAT(result["reasons"].dump(), HasSubstr("the store is a folder"));
+  EXPECT_EQ(result.value("can_write", false), true) << "they wait on";
+  std::filesystem::rename(path("given"), path("data/sixpoint/journal"));
+  write_now("pass", true);
   EXPECT_EQ(station.stop(SIGTERM), 0);
   ::unsetenv("XDG_DATA_HOME");
 }

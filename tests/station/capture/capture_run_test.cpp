@@ -300,7 +300,7 @@ TEST(CaptureRun, WhatAKilledProgramFetchedAnewIsRemovedByTheNextOne) {
     if (person.repeated.size() > 1) {
       break;  // the second download was done
     }
-    ASSERT_TRUE(last.asked_again);
+    ASSERT_EQ(last.asked_again, 1);
     left_over += files_from(bench, "c-new").size();
     // Names that this capture does not make.
     const std::vector<std::string> others = {
@@ -349,7 +349,7 @@ CaptureResume left_when_asked_again(Person& person, std::size_t begins_anew_at) 
   EXPECT_EQ(person.repeated.size(), 1U);
   person.hooks.ask = ask;
   person.hooks.progress = nullptr;
-  EXPECT_TRUE(last->asked_again);
+  EXPECT_EQ(last->asked_again, 1);
   return *last;
 }
 
@@ -368,7 +368,7 @@ TEST(CaptureRun, WhatWasAskedForAgainBeforeARestartReplacesTheFileOfBefore) {
     ASSERT_EQ(left.done.size(), in_pieces ? 5U : 0U);
     const std::string before = *file_sha256(bench.env.files, "c.gt3x");
     person.hooks.progress = [](const CaptureResume& now) {
-      EXPECT_TRUE(now.asked_again) << "a third program finds the same";
+      EXPECT_EQ(now.asked_again, 1) << "a third program finds the same";
     };
     const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
                                     person.hooks, left);
@@ -400,6 +400,19 @@ TEST(CaptureRun, WhoStopsAfterARestartGetsTheJudgementOfTheFileOfBefore) {
   EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
 }
 
+// The two that one program was to ask at most, in two.
+TEST(CaptureRun, ASideIsAskedForTwiceAtMostAlsoOverARestart) {
+  VirtualBench bench;
+  Person person(bench);
+  person.errors = 100;
+  const CaptureResume left = left_when_asked_again(person, 0);
+  const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                  person.hooks, left);
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->usable());
+  EXPECT_EQ(person.repeated.size(), 2U);
+}
+
 class FilesThatUnplug final : public ForwardingFiles {
  public:
   FilesThatUnplug(VirtualBench& bench, std::string name)
@@ -416,6 +429,98 @@ class FilesThatUnplug final : public ForwardingFiles {
   VirtualBench& bench_;
   std::string name_;
 };
+
+// The unit is pulled out where something is asked about a file, or a folder is listed.
+class FilesThatUnplugWhereAsked final : public ForwardingFiles {
+ public:
+  FilesThatUnplugWhereAsked(VirtualBench& bench, std::string about)
+      : ForwardingFiles(bench.env.files), bench_(bench), about_(std::move(about)) {}
+  Result<FileInfo> info(const std::string& path) override {
+    look_at(path);
+    return ForwardingFiles::info(path);
+  }
+  Result<std::vector<std::string>> list(const std::string& path) override {
+    look_at(path);
+    return ForwardingFiles::list(path);
+  }
+
+ private:
+  void look_at(const std::string& path) {
+    if (path == about_) {
+      const std::lock_guard lock(bench_.plugged->mutex);
+      bench_.plugged->unplugged = true;
+    }
+  }
+  VirtualBench& bench_;
+  std::string about_;
+};
+
+void plug(VirtualBench& bench, bool in) {
+  const std::lock_guard lock(bench.plugged->mutex);
+  bench.plugged->unplugged = !in;
+}
+
+// The program ends while the unit is out: before a side is asked for again, or before its recording
+// is ended.
+TEST(CaptureRun, ARepeatedSideWaitsForTheNextProgramWhereThisOneEndsWithoutTheUnit) {
+  for (const bool is_asked : {false, true}) {
+    SCOPED_TRACE(is_asked);
+    VirtualBench bench;
+    Person person(bench);
+    FilesThatUnplugWhereAsked files(bench, is_asked ? "" : "c-new.gt3x");
+    Env env{bench.env.env.clock, files};
+    CaptureResume last;
+    person.hooks.progress = [&](const CaptureResume& now) {
+      last = now;
+      if (is_asked && now.asked_again > 0 && now.done.size() == device::kPoses.size()) {
+        plug(bench, false);
+      }
+    };
+    person.hooks.reopen = [](const Error&) -> Result<UnitOnJig> {
+      return fail(ErrorCode::internal, "the program ends", {}, "start it again");
+    };
+    EXPECT_FAILS(run_capture({bench.unit.get(), &person.lazy}, env, person.options, person.hooks),
+                 ErrorCode::internal);
+    plug(bench, true);
+    bench.unit = *device::WireUnit::open(mocks::link_to(bench.plugged, false));
+    person.hooks.progress = nullptr;
+    const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                    person.hooks, last);
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->usable()) << testing::PrintToString(report->notes);
+    EXPECT_EQ(person.repeated.size(), 1U);
+  }
+}
+
+// The unit is out for longer than is waited: from the start of the next program on, while its
+// recording is begun anew, or while the side is asked for.
+TEST(CaptureRun, WithoutItsUnitARepeatedSideLeavesTheFileOfBefore) {
+  for (const std::string when : {"start", "begin", "side"}) {
+    SCOPED_TRACE(when);
+    VirtualBench bench;
+    Person person(bench);
+    const CaptureResume left = left_when_asked_again(person, 0);
+    const std::string before = *file_sha256(bench.env.files, "c.gt3x");
+    FilesThatUnplugWhereAsked files(bench, when == "begin" ? "." : "");
+    Env env{bench.env.env.clock, files};
+    plug(bench, when != "start");
+    person.hooks.ask = [&](device::Pose, std::size_t, std::size_t) {
+      plug(bench, false);
+      return SideAnswer::waiting;
+    };
+    person.hooks.reopen = [](const Error&) -> Result<UnitOnJig> {
+      return fail(ErrorCode::device_unavailable, "the unit did not come back");
+    };
+    const auto report =
+        run_capture({bench.unit.get(), &person.lazy}, env, person.options, person.hooks, left);
+    ASSERT_OK(report);
+    EXPECT_EQ(report->file, "c.gt3x");
+    EXPECT_EQ(report->file_sha256, before);
+    ASSERT_TRUE(report->solved);
+    EXPECT_THAT(report->solved->verification.missing_directions, testing::ElementsAre("-x"));
+    EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
+  }
+}
 
 // The unit goes away in the second download and does not come back.
 TEST(CaptureRun, ThePartOfASecondDownloadThatBrokeOffIsRemoved) {
@@ -438,7 +543,7 @@ TEST(CaptureRun, AFileOfAnotherStaysWhereNoSideWasAskedForAgain) {
   Person person(bench);
   ASSERT_OK(write_file(bench.env.files, "c-new-1.gt3x", "another's"));
   CaptureResume resume;
-  person.hooks.progress = [&](const CaptureResume& now) { EXPECT_FALSE(now.asked_again); };
+  person.hooks.progress = [&](const CaptureResume& now) { EXPECT_EQ(now.asked_again, 0); };
   const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
                                   person.hooks, resume);
   ASSERT_OK(report);

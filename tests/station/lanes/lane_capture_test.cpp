@@ -1,5 +1,7 @@
 // Calibration files recorded in a lane.
 #include "base/forwarding_files.h"
+#include "base/sha256.h"
+#include "station/lanes/run_folder.h"
 #include "station/page/station_in_process.h"
 
 namespace sixpoint::station {
@@ -120,6 +122,37 @@ TEST(LaneCapture, ACaptureSurvivesTheProgram) {
   }
   Station station({kCaptured}, folder.path(), 24, bench);
   station.wait_state(1, "idle");  // nothing is left to go on with
+}
+
+// Sides were asked for again, and the program ended; the next one waits for the unit in vain. The
+// file of before is judged: here it is a good one.
+TEST(LaneCapture, WithoutItsUnitACaptureThatWasAskedForAgainLeavesTheFileOfBefore) {
+  const tests::TemporaryFolder folder;
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
+  std::string file;
+  {
+    Station station({device}, folder.path(), 24, bench);
+    station.start("/api/capture");
+    file = station.wait_state(1, "done")["result"]["file"];
+    ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+  }
+  UnfinishedCapture left;
+  left.serial = "MOS2A45130007";
+  left.output = file;
+  left.resume.asked_again = 1;
+  left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+  ASSERT_OK(
+      RunFolder(posix_env(), folder.path() + "/state/lane-1-" + text_sha256(device).substr(0, 8))
+          .save_capture(left));
+  Station station({device}, folder.path(), 24, bench);
+  station.wait_state(1, "unit_away");
+  ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object(), ""), 200);
+  const Json lane = station.wait(1, [](const Json& json) { return json["result"].is_object(); });
+  EXPECT_EQ(lane["result"]["file"], file) << lane["result"].dump(1);
+  EXPECT_EQ(lane["result"]["verdict"], "pass");
+  EXPECT_EQ(lane["result"]["stored"], true);
+  EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("the recording of before is judged"));
 }
 
 // A unit that lost its memory meanwhile: a note says so, and all sides are asked for again.

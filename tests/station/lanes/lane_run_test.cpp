@@ -157,6 +157,7 @@ TEST(LaneRun, AWriteAfterwardsStaysOneAfterARestart) {
     }
     const Json done = station.wait(1, stored);
     EXPECT_EQ(station.kinds, std::vector<std::string>{kWriteKind}) << done.dump(1);
+    EXPECT_TRUE(station.asked_to_write.empty()) << "they are in the unit already";
     if (comes_back) {
       EXPECT_EQ(done["result"]["verdict"], "pass") << done.dump(1);
       EXPECT_THAT(done["result"]["reasons"].dump(), HasSubstr("written after the run"));
@@ -207,37 +208,151 @@ TEST(LaneRun, ConstantsThatTheJournalKeepsAreAskedAboutBeforeTheyAreWritten) {
   station.wait(1, [](const Json& json) {
     return json["result"].is_object() && json["result"]["verdict"] == "refused";
   });
-  EXPECT_EQ(station.asked_to_write, std::vector<std::string>{"MOS2A45130007 def456 kept here"});
+  EXPECT_EQ(station.asked_to_write, std::vector<std::string>{"MOS2A45130007 def456"});
 }
 
 // The station is locked after the run, and opened again.
 TEST(LaneRun, ConstantsWaitOnWhereTheStationRefusesToWriteThem) {
+  struct Refused {
+    const char* path;
+    Json body;
+  };
+  const std::vector<Refused> cases = {{"/api/run", {{"last_run", true}}},
+                                      {"/api/run", Json::object()},
+                                      {"/api/capture", Json::object()}};
+  for (const auto& [path, body] : cases) {
+    SCOPED_TRACE(path + body.dump());
+    const tests::TemporaryFolder folder;
+    Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+    const auto refuse = [&](bool refused) {
+      const std::lock_guard lock(station.start_mutex);
+      station.starts_refused = refused;
+    };
+    const auto stored = [](const Json& json) {
+      return json["result"].is_object() && json["result"]["stored"] == true;
+    };
+    station.start("/api/run");
+    station.wait(1, stored);
+    refuse(true);
+    ASSERT_EQ(station.post(path, body), 202);
+    const Json refused = station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"]["verdict"] == "refused";
+    });
+    EXPECT_EQ(refused["result"].value("can_write", false), true) << "from the first moment on";
+    refuse(false);
+    ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+    station.wait(
+        1, [&](const Json& json) { return stored(json) && json["result"]["written"] == true; });
+    ASSERT_EQ(station.reports.size(), 2U);
+    const std::string& first = station.reports.front().raw_csv;
+    const std::string& second = station.reports.back().raw_csv;
+    EXPECT_TRUE(second.starts_with(first));
+    EXPECT_EQ(second.find(first.substr(0, 1000), 1), std::string::npos) << "its samples once";
+  }
+}
+
+// What began after the run that passed, or was plugged in, ends the wait: also where a start is
+// refused then.
+TEST(LaneRun, NoRefusedStartBringsBackConstantsOfAnEarlierRun) {
+  for (const std::string between : {"/api/run", "/api/capture", "another unit"}) {
+    SCOPED_TRACE(between);
+    const tests::TemporaryFolder folder;
+    Station station({"virtual:seed=7,serial=MOS2A45130007,pace=100"}, folder.path());
+    station.start("/api/run");
+    place_unit(station, 1, 40);
+    const Json passed = station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"]["stored"] == true;
+    });
+    ASSERT_EQ(passed["result"]["can_write"], true);
+    const auto verdict = [&](const std::string& expected) {
+      return station.wait(1, [&](const Json& json) {
+        return json["result"].is_object() && json["result"]["verdict"] == expected;
+      });
+    };
+    if (between == "another unit") {
+      for (const char* serial : {"MOS2A45139999", "MOS2A45130007"}) {
+        ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "swap"}, {"serial", serial}}), 200);
+        station.wait(1, [&](const Json& json) {
+          return json["unit"].is_object() && json["unit"]["serial"] == serial;
+        });
+      }
+    } else {
+      ASSERT_EQ(station.post(between, Json::object()), 202);
+      station.wait(1, [](const Json& json) { return json["result"].is_null(); });
+      ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+      verdict("stopped");
+    }
+    {
+      const std::lock_guard lock(station.start_mutex);
+      station.starts_refused = true;
+    }
+    ASSERT_EQ(station.post("/api/run", Json::object()), 202);
+    EXPECT_FALSE(verdict("refused")["result"].contains("can_write"));
+    EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409);
+    EXPECT_TRUE(station.asked_to_write.empty());
+  }
+}
+
+// The disk of the store is not mounted, its server does not answer, or it is of a later version.
+TEST(LaneRun, ConstantsWaitOnWhereTheStoreDoesNotAnswerWhateverItsError) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
-  const auto refuse = [&](bool refused) {
+  const auto set_answer = [&](const std::optional<Error>& error) {
     const std::lock_guard lock(station.start_mutex);
-    station.starts_refused = refused;
-  };
-  const auto stored = [](const Json& json) {
-    return json["result"].is_object() && json["result"]["stored"] == true;
+    station.no_answer = error;
   };
   station.start("/api/run");
-  station.wait(1, stored);
-  refuse(true);
-  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
-  const Json refused = station.wait(1, [](const Json& json) {
-    return json["result"].is_object() && json["result"].contains("can_write");
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
   });
-  EXPECT_EQ(refused["result"]["verdict"], "refused");
-  refuse(false);
+  for (const ErrorCode code :
+       {ErrorCode::no_input, ErrorCode::configuration, ErrorCode::device_unavailable}) {
+    const std::string what = fmt::format("no answer {}", static_cast<int>(code));
+    set_answer(Error{code, what, {}, {}});
+    ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+    const Json refused = station.wait(1, [&](const Json& json) {
+      return json["result"].is_object() &&
+             json["result"]["reasons"].dump().find(what) != std::string::npos;
+    });
+    EXPECT_EQ(refused["result"]["verdict"], "refused");
+    EXPECT_EQ(refused["result"].value("can_write", false), true);
+  }
+  set_answer({});
   ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
-  station.wait(1,
-               [&](const Json& json) { return stored(json) && json["result"]["written"] == true; });
-  ASSERT_EQ(station.reports.size(), 2U);
-  const std::string& first = station.reports.front().raw_csv;
-  const std::string& second = station.reports.back().raw_csv;
-  EXPECT_TRUE(second.starts_with(first));
-  EXPECT_EQ(second.find(first.substr(0, 1000), 1), std::string::npos) << "its samples once";
+  const Json written = station.wait(1, [&](const Json& json) {
+    return json["result"].is_object() && json["result"].value("written", false);
+  });
+  EXPECT_EQ(written["result"]["verdict"], "pass") << written.dump(1);
+}
+
+// The program ended between the order to write and the write; meanwhile they were withdrawn.
+TEST(LaneRun, AWriteThatGoesOnIsAskedAgainWhetherItsConstantsWereWithdrawn) {
+  for (const std::string id : {"def456", ""}) {  // without: of an earlier version
+    const tests::TemporaryFolder folder;
+    const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
+    UnfinishedRun left;
+    left.device = device;
+    left.serial = "MOS2A45130007";
+    left.station = "bench-1";
+    left.jig = "virtual";
+    left.kind = kWriteKind;
+    left.constants_id = id;
+    left.write = true;
+    left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+    ASSERT_OK(
+        RunFolder(posix_env(), folder.path() + "/state/lane-1-" + text_sha256(device).substr(0, 8))
+            .save(left));
+    Station station({device}, folder.path(), 24, {}, {}, false,
+                    /*its_constants_are_withdrawn=*/true);
+    const Json lane = station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"]["stored"] == true;
+    });
+    EXPECT_THAT(lane["result"]["reasons"].dump(), HasSubstr("these constants were withdrawn"));
+    EXPECT_EQ(lane["result"]["verdict"], "inconclusive");
+    EXPECT_EQ(lane["result"]["written"], false);
+    EXPECT_EQ(station.asked_to_write, std::vector<std::string>{"MOS2A45130007 " + id});
+    EXPECT_EQ(station.kinds, std::vector<std::string>{kWriteKind});
+  }
 }
 
 // Ended on the last day of the jig, and begun again days later.

@@ -30,6 +30,7 @@ UnfinishedRun a_run() {
   run.resume.as_found = device::CalibrationPage{};
   run.resume.as_found->constants.zero_lsb = {1, -2, 3};
   run.resume.progress.refusals = 4;
+  run.constants_id = "def456";
   run.resume.write_begun = true;
   run.resume.stream.samples = 1000;
   run.resume.stream.lost_samples = 12;
@@ -68,7 +69,8 @@ TEST(RunFolder, ABadRunSetsAsideItselfAndItsSamplesAlone) {
   EXPECT_FALSE((*lane.load_capture()).has_value());
 }
 
-// A folder of an earlier version has no `stream`, no `write_begun` and no `kind`.
+// A folder of an earlier version has no `stream`, no `write_begun`, no `kind` and no id of
+// constants.
 TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");
@@ -77,11 +79,13 @@ TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   json.erase("stream");
   json.erase("write_begun");
   json.erase("kind");
+  json.erase("constants_id");
   std::ofstream(folder / "lane/run.json") << json.dump();
   const auto left = lane.load();
   ASSERT_OK(left);
   EXPECT_FALSE((*left)->resume.write_begun);
   EXPECT_EQ((*left)->kind, "jig");
+  EXPECT_EQ((*left)->constants_id, "");
   EXPECT_EQ((*left)->resume.stream.samples, 0U);
 }
 
@@ -107,6 +111,7 @@ TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
   EXPECT_EQ(run.operator_name, "Łukasz");
   EXPECT_EQ(run.filter, calib::FilterConfiguration::legacy);
   EXPECT_TRUE(run.write);
+  EXPECT_EQ(run.constants_id, "def456");
   EXPECT_TRUE(run.resume.write_begun);
   EXPECT_EQ(run.resume.stream.samples, 1000U);
   EXPECT_EQ(run.resume.stream.lost_samples, 12U);
@@ -277,7 +282,7 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   capture.serial = "MOS2A45130007";
   capture.output = "out.gt3x";
   capture.resume.done = {{device::Pose::plus_z, 3}, {device::Pose::minus_x, 4}};
-  capture.resume.asked_again = true;
+  capture.resume.asked_again = 2;
   ASSERT_OK(lane.save_capture(capture));
   const std::string json = text_of_file(folder / "lane/capture.json");
   EXPECT_NE(json.find("\"-x\""), std::string::npos) << json;
@@ -287,12 +292,20 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   ASSERT_EQ((*left)->resume.done.size(), 2U);
   EXPECT_EQ((*left)->resume.done[1].pose, CapturePose(device::Pose::minus_x));
   EXPECT_EQ((*left)->resume.done[1].recording, 4);
-  EXPECT_TRUE((*left)->resume.asked_again);
-  // An earlier version did not write it.
+  EXPECT_EQ((*left)->resume.asked_again, 2);
+  // An earlier version did not write it, and a later one not how often.
   auto old = nlohmann::ordered_json::parse(json);
+  for (const bool is_asked : {true, false}) {
+    old["asked_again"] = is_asked;
+    std::ofstream(folder / "lane/capture.json") << old;
+    EXPECT_EQ((*lane.load_capture())->resume.asked_again, is_asked ? 1 : 0);
+  }
+  old["asked_again"] = "twice";
+  std::ofstream(folder / "lane/capture.json") << old;
+  EXPECT_FAILS(lane.load_capture(), ErrorCode::bad_data);
   old.erase("asked_again");
   std::ofstream(folder / "lane/capture.json") << old;
-  EXPECT_FALSE((*lane.load_capture())->resume.asked_again);
+  EXPECT_EQ((*lane.load_capture())->resume.asked_again, 0);
   ASSERT_OK(lane.clear_capture());
   EXPECT_FALSE(lane.load_capture()->has_value());
 }

@@ -32,11 +32,14 @@ class Station {
   static constexpr const char* kToken = "0123456789abcdef";
 
   // `its_bench`: one that outlives this program, where the units shall.
-  // `refuses_starts`: starts_refused from the first moment on.
+  // `refuses_starts`, `its_constants_are_withdrawn`: starts_refused and is_withdrawn from the first
+  // moment on.
   explicit Station(std::vector<std::string> devices, const std::string& folder,
                    int most_streams = 24, std::shared_ptr<mocks::VirtualBench> its_bench = {},
-                   const ServerOptions& server_options = {}, bool refuses_starts = false)
+                   const ServerOptions& server_options = {}, bool refuses_starts = false,
+                   bool its_constants_are_withdrawn = false)
       : starts_refused(refuses_starts),
+        is_withdrawn(its_constants_are_withdrawn),
         bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
         registry_(known_devices()),
         operators_(posix_env(), folder + "/operators.json") {
@@ -56,12 +59,15 @@ class Station {
                                   fail(ErrorCode::configuration, "the jig is overdue", {}, "sign"))
                             : retest;
     };
-    options.may_write = [this](const WaitingConstants& waiting) -> Status {
+    options.may_write = [this](const WaitingConstants& waiting) -> Result<std::optional<Error>> {
       const std::lock_guard lock(start_mutex);
-      asked_to_write.push_back(fmt::format("{} {}{}", waiting.serial, waiting.id,
-                                           waiting.are_kept_here ? " kept here" : ""));
-      return is_withdrawn ? Status(fail(ErrorCode::configuration, "these constants were withdrawn"))
-                          : Status();
+      asked_to_write.push_back(waiting.serial + " " + waiting.id);
+      if (no_answer) {
+        return fail(*no_answer);
+      }
+      return is_withdrawn ? std::optional(Error{
+                                ErrorCode::configuration, "these constants were withdrawn", {}, {}})
+                          : std::nullopt;
     };
     const StoreConstants store_constants = [this](const CaptureReport&) {
       const std::lock_guard lock(mutex);
@@ -165,10 +171,11 @@ class Station {
   std::vector<std::string> kinds;
   std::vector<std::string> jigs;
   std::vector<bool> authenticated;
-  std::mutex start_mutex;                   // guards the four that follow
+  std::mutex start_mutex;                   // guards the five that follow
   bool starts_refused = false;              // the answer to whether a run may start
   RetestState retest;                       // ... otherwise: what the unit's earlier runs demand
   bool is_withdrawn = false;                // the constants that "write now" would write
+  std::optional<Error> no_answer;           // of the store, to whether they are
   std::vector<std::string> asked_to_write;  // serial and constants
   bool store_is_away = false;               // and the journal with it
   bool store_refuses = false;               // the record itself

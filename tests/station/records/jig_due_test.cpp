@@ -22,7 +22,11 @@ TEST(JigDueRule, FollowsTheTable) {
   const auto refused = check_jig_due({over, "", "Eve"}, now);
   EXPECT_FAILS(refused, ErrorCode::configuration);
   EXPECT_THAT(refused.error().what, testing::HasSubstr("2027-03-31"));
-  EXPECT_FAILS(check_jig_due({over, "laboratory closed", ""}, now), ErrorCode::usage);
+  for (const char* due : {"", "2027-03-31", "2027-04-02"}) {
+    EXPECT_FAILS(parse_jig_due(due, "laboratory closed", ""), ErrorCode::usage);
+    EXPECT_OK(parse_jig_due(due, "laboratory closed", "Eve"));
+    EXPECT_OK(parse_jig_due(due, "", ""));
+  }
   EXPECT_OK(check_jig_due({over, "laboratory closed", "Eve"}, now));
   EXPECT_EQ(jig_due_note({over, "laboratory closed", "Eve"}, now),
             "the jig was due for its own calibration on 2027-03-31; Eve signed: laboratory closed");
