@@ -16,7 +16,7 @@ constexpr double kFitted = 5;
 // Log odds of each of the three other causes before the data, over the noise: a convention.
 constexpr double kLogPriorOther = -2;
 // Prior variances of the logarithm of an axis' variance: of noise, and of another cause.
-constexpr double kAlikeVariance = 0.1;
+constexpr double kAlikeVariance = 0.05;
 constexpr double kUnlikeVariance = 4;
 
 // Sums over modes: z is each axis' coefficient in units of what noise of the found size would give
