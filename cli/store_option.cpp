@@ -253,6 +253,10 @@ CLI::Option* add_store_option(CLI::App& command, std::string& location) {
           std::string("~/.local/share/sixpoint/store.db)"));
 }
 
+std::string stored_serial(db::Store& store, const std::string& given) {
+  return store.whole_key("units", given) ? given : gt3x::unit_serial(given);
+}
+
 bool store_exists(Context& context, const std::string& location) {
   const std::string path = place_of(location);
   return is_on_server(path) || context.env.files.info(path).has_value();

@@ -41,6 +41,10 @@ void warn_without_store(Context& context, const Result<db::Store>& store);
 // makes no empty one.
 Result<db::Store> open_existing_store(Context& context, const std::string& location);
 
+// The serial number as the store has it: as given where it knows such a unit, else in the capitals of
+// a unit's (gt3x/forms/model.h).
+std::string stored_serial(db::Store& store, const std::string& given);
+
 // Is there a file? A store on a server always exists.
 bool store_exists(Context& context, const std::string& location);
 // The path of a store that is to be made; makes the folder of the default one.

@@ -123,7 +123,11 @@ Result<std::string> Store::correct(const Correction& correction) {
   now.made_at = env_->clock.now();
   SIXPOINT_ASSIGN(now.row_id, whole_key(correction.table, correction.row_id));
   if (correction.action == "prefer") {
-    SIXPOINT_CHECK(refuse_withdrawn(now.row_id));
+    SIXPOINT_ASSIGN(const bool withdrawn, is_withdrawn(now.row_id));
+    if (withdrawn) {
+      return fail(ErrorCode::usage, "constants that are withdrawn apply to nothing", now.row_id,
+                  "reinstate them first, or prefer another set");
+    }
   }
   SIXPOINT_ASSIGN(Row row, new_row(now));
   return add(single_row("corrections", std::move(row)));
@@ -158,15 +162,15 @@ Result<std::string> Store::whole_key(std::string_view table_name, const std::str
               database_->location(), "give more of its digits");
 }
 
-Status Store::refuse_withdrawn(const std::string& constants_id) {
+Result<bool> Store::is_withdrawn(const std::string& constants_id) {
   SIXPOINT_ASSIGN(const auto sets,
                   select<ConstantsRecord>("WHERE id = $1", std::vector<Value>{constants_id}));
-  SIXPOINT_ASSIGN(const UnitHistory history, constants_history(sets.at(0).serial));
-  if (history.is_withdrawn(constants_id)) {
-    return fail(ErrorCode::usage, "constants that are withdrawn apply to nothing", constants_id,
-                "reinstate them first, or prefer another set");
+  if (sets.empty()) {
+    return fail(ErrorCode::no_input, fmt::format("no constants '{}'", printable(constants_id, 60)),
+                database_->location(), "'sixpoint history SERIAL' lists them");
   }
-  return {};
+  SIXPOINT_ASSIGN(const UnitHistory history, constants_history(sets[0].serial));
+  return history.is_withdrawn(constants_id);
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,

@@ -85,6 +85,8 @@ class Store final : public RecordWriter {
   // The sets of constants of a unit and the corrections about them, without the rest of its
   // history.
   Result<UnitHistory> constants_history(const std::string& serial);
+  // UnitHistory::is_withdrawn() of the set of this whole id; no_input where there is none.
+  Result<bool> is_withdrawn(const std::string& constants_id);
   // The whole history, oldest first, withdrawn sets included.
   Result<std::vector<ConstantsRecord>> history(const std::string& serial);
   Result<UnitHistory> unit_history(const std::string& serial);
@@ -113,7 +115,6 @@ class Store final : public RecordWriter {
   Result<AuditReport> audit(const std::string& earlier_head = {});
 
  private:
-  Status refuse_withdrawn(const std::string& constants_id);
   Store(Env& env, std::unique_ptr<Database> database)
       : env_(&env), database_(std::move(database)) {}
   // The records of a table for which `clauses` hold ("WHERE ... ORDER BY ...").

@@ -5,20 +5,19 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-constexpr double kNominal_lsb_per_g = 250;  // ADXL362 data sheet, range of 8 g
-
-}  // namespace
-
 PerAxis<int> Sensor::read(const Eigen::Vector3d& sensed_g) {
   PerAxis<int> raw{};
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double lsb =
-        truth_.sensitivity_lsb_per_g[axis] * sensed_g[static_cast<Eigen::Index>(axis)] +
-        truth_.zero_lsb[axis];
-    const double limited_lsb = kNominal_lsb_per_g * format_.limited(lsb / kNominal_lsb_per_g);
-    raw[axis] = static_cast<int>(std::round(std::clamp(limited_lsb, -2048.0, 2047.0)));
+    double lsb = truth_.sensitivity_lsb_per_g[axis] * sensed_g[static_cast<Eigen::Index>(axis)] +
+                 truth_.zero_lsb[axis];
+    if (std::isfinite(format_.limit_g)) {
+      // Stored g to raw counts: Eq. 4-6 the other way round.
+      const double limit_lsb = format_.limit_g * lsb_per_stored_g_[axis];
+      lsb = std::clamp(lsb, stored_zero_lsb_[axis] - limit_lsb, stored_zero_lsb_[axis] + limit_lsb);
+    }
+    // What wraps is the stored number: it has to come that far.
+    lsb = format_.wraps ? std::clamp(lsb, -32768.0, 32767.0) : std::clamp(lsb, -2048.0, 2047.0);
+    raw[axis] = static_cast<int>(std::round(lsb));
   }
   return raw;
 }

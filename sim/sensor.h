@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdlib>
 
 #include "base/random.h"
 #include "sim/effects/effect.h"
@@ -16,7 +17,8 @@ namespace sixpoint::sim {
 
 // Noise is white and Gaussian, drawn at every sample, and felt before the front end does what it
 // does (Effect::on_analog); readings are rounded to the nearest count and clipped to the ADXL362's
-// 12 bits, or below, at the format's limit. One object belongs to one thread.
+// 12 bits (to 16 where the format wraps), or below, where the stored constants make the format's
+// limit of them. One object belongs to one thread.
 class Sensor {
  public:
   Sensor(const UnitTruth& unit, FilterConfiguration filter, Random noise,
@@ -24,6 +26,9 @@ class Sensor {
       : truth_(unit.sensor(filter)), noise_(noise), format_(format) {
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       noise_g_[axis] = unit.noise_mg[axis] / kMgPerG;
+      lsb_per_stored_g_[axis] =
+          std::abs(unit.constants.positive_lsb[axis] - unit.constants.negative_lsb[axis]) / 2.0;
+      stored_zero_lsb_[axis] = unit.constants.zero_lsb[axis];
     }
   }
   void add_noise(Eigen::Vector3d& sensed_g) {
@@ -36,6 +41,8 @@ class Sensor {
  private:
   SensorTruth truth_;
   PerAxis<double> noise_g_{};
+  PerAxis<double> lsb_per_stored_g_{};
+  PerAxis<double> stored_zero_lsb_{};
   Random noise_;
   NumberFormat format_;
 };

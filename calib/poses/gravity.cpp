@@ -52,6 +52,10 @@ Result<LocalGravity> gravity_entered(double m_per_s2) {
 }
 
 Result<std::optional<LocalGravity>> local_gravity(const GravityGiven& given) {
+  if (given.m_per_s2 && (given.latitude_deg || given.altitude_m)) {
+    return fail(ErrorCode::usage, "gravity is given, and a place to compute it from", "gravity",
+                "give one: gravity in m/s2, or the latitude with the altitude");
+  }
   if (given.m_per_s2) {
     return gravity_entered(*given.m_per_s2);
   }

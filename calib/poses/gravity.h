@@ -38,7 +38,8 @@ struct GravityGiven {
 };
 
 //   m_per_s2  latitude  altitude  answer
-//   given     any       any       gravity_entered()
+//   given     -         -         gravity_entered()
+//   given     or given, or given  usage: two answers
 //   -         given     any       gravity_at() both
 //   -         -         given     usage: an altitude alone says nothing
 //   -         -         -         none: gravity is unknown

@@ -204,7 +204,8 @@ void print_history(const db::UnitHistory& history, Context& context) {
 
 Status run_history(const HistoryCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto history, store.unit_history(options.serial));
+  const std::string serial = stored_serial(store, options.serial);
+  SIXPOINT_ASSIGN(const auto history, store.unit_history(serial));
   if (history.empty()) {
     return fail(ErrorCode::no_input, "the store has no records of this unit", options.serial,
                 "'sixpoint units' lists the units in the store");
@@ -214,7 +215,7 @@ Status run_history(const HistoryCommandOptions& options, Context& context) {
     return {};
   }
   Json json = document("history");
-  json["serial"] = options.serial;
+  json["serial"] = serial;
   Json& constants = json["constants"] = Json::array();
   const auto about = about_constants(history);
   for (std::size_t i = 0; i < history.constants.size(); ++i) {

@@ -118,16 +118,26 @@ std::string login_name() {
 // Adds a row about an old one: withdraw, reinstate, prefer, note.
 Result<Answer> correct(db::Store& store, const StoreCommandOptions& options,
                        const std::string& action) {
+  if (action == "withdraw" || action == "reinstate") {
+    SIXPOINT_ASSIGN(const std::string id, store.whole_key(options.table, options.id));
+    SIXPOINT_ASSIGN(const bool withdrawn, store.is_withdrawn(id));
+    if (withdrawn == (action == "withdraw")) {
+      return fail(
+          ErrorCode::configuration,
+          withdrawn ? "these constants are withdrawn already" : "these constants are not withdrawn",
+          id, "'sixpoint history SERIAL' says what was decided, and why");
+    }
+  }
   const db::Correction correction{
       .table = options.table,
-      .row_id = options.id,
+      .row_id = options.table == "units" ? stored_serial(store, options.id) : options.id,
       .action = action,
       .operator_name = options.operator_name.empty() ? login_name() : options.operator_name,
       .reason = options.reason};
   Answer answer;
   SIXPOINT_ASSIGN(answer.json["correction"], store.correct(correction));
   answer.json["action"] = action;
-  SIXPOINT_ASSIGN(const std::string id, store.whole_key(options.table, options.id));
+  SIXPOINT_ASSIGN(const std::string id, store.whole_key(options.table, correction.row_id));
   answer.json["about"] = {{"table", options.table}, {"id", id}};
   return answer;
 }
@@ -269,13 +279,14 @@ Result<Answer> due(const StoreCommandOptions& options, Context& context) {
 
 Result<Answer> trend(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto points, store.trend(options.id));
+  const std::string serial = stored_serial(store, options.id);
+  SIXPOINT_ASSIGN(const auto points, store.trend(serial));
   if (points.empty()) {
     return fail(ErrorCode::no_input, "the store has no constants of this unit", options.id,
                 "'sixpoint units' lists the units in the store");
   }
   Answer answer;
-  answer.json["serial"] = options.id;
+  answer.json["serial"] = serial;
   Json& list = answer.json["points"] = Json::array();
   Columns table({"made", "filter", "method", "jig", "id", "verdict", "values"});
   for (const auto& point : points) {

@@ -35,15 +35,16 @@ Result<db::Store> signed_store(const CheckUnitCommandOptions& options, Context& 
   return open_store(context, options.store);
 }
 
-// Adds an engineer's decision to the store: what the answer says of it.
-Result<Json> record(const CheckUnitCommandOptions& options, db::Store& store, const char* command,
-                    const std::string& action) {
+// Adds an engineer's decision to the store, about a unit or about the station: what the answer says
+// of it.
+Result<Json> record(const CheckUnitCommandOptions& options, db::Store& store,
+                    const std::string& serial, const char* command, const std::string& action) {
   std::string reason = options.reason;
   if (!options.expect.empty()) {
     SIXPOINT_ASSIGN(reason, station::reason_with_codes(options.expect, options.reason));
   }
   const db::StationEvent event{.station = options.station,
-                               .serial = options.serial,
+                               .serial = serial,
                                .action = action,
                                .operator_name = options.operator_name,
                                .reason = reason};
@@ -57,10 +58,11 @@ Result<Json> record(const CheckUnitCommandOptions& options, db::Store& store, co
 Status decide(const CheckUnitCommandOptions& options, Context& context, const char* command,
               const std::string& action, const std::string& done) {
   SIXPOINT_ASSIGN(auto store, signed_store(options, context));
-  SIXPOINT_ASSIGN(Json json, record(options, store, command, action));
-  json["serial"] = options.serial;
+  const std::string serial = stored_serial(store, options.serial);
+  SIXPOINT_ASSIGN(Json json, record(options, store, serial, command, action));
+  json["serial"] = serial;
   json["station"] = options.station;
-  return print_answer(context, options.json, json, done + "\n");
+  return print_answer(context, options.json, json, fmt::format("{} {}\n", printable(serial), done));
 }
 
 Status show_state(const CheckUnitCommandOptions& options, Context& context, const char* command) {
@@ -100,7 +102,7 @@ Status show_state(const CheckUnitCommandOptions& options, Context& context, cons
 Status sign(const CheckUnitCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, signed_store(options, context));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
-  SIXPOINT_ASSIGN(Json json, record(options, store, "station-lock",
+  SIXPOINT_ASSIGN(Json json, record(options, store, "", "station-lock",
                                     options.new_baseline ? "sign_new_baseline" : "sign"));
   SIXPOINT_ASSIGN(
       const auto state,
@@ -118,32 +120,32 @@ Status sign(const CheckUnitCommandOptions& options, Context& context) {
 
 Status retest(const CheckUnitCommandOptions& options, Context& context) {
   if (options.release) {
-    return decide(options, context, "retest", "release",
-                  printable(options.serial) + " may be measured again");
+    return decide(options, context, "retest", "release", "may be measured again");
   }
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
-  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(options.serial));
+  const std::string serial = stored_serial(store, options.serial);
+  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(serial));
   if (history.empty()) {
-    context.log().warn("{}: the store knows no such unit", printable(options.serial));
+    context.log().warn("{}: the store knows no such unit", printable(serial));
   }
   SIXPOINT_ASSIGN(const auto state,
                   station::StationGuard(context.env, guard_folder(options.store), limits)
-                      .unit_state(store, options.serial));
+                      .unit_state(store, serial));
   context.worsen(state.may_start ? kExitPassed : kExitFailed);
   Json json = document("retest");
-  json["serial"] = options.serial;
+  json["serial"] = serial;
   json["may_start"] = state.may_start;
   json["failures_in_row"] = state.failures_in_row;
   json["passes_needed"] = state.passes_needed;
   json["retest_of"] = text_or_null(state.retest_of);
-  return print_answer(context, options.json, json,
-                      fmt::format("{}: {}; {}\n", printable(options.serial),
-                                  state.may_start ? "may be measured" : state.reason,
-                                  state.passes_needed == 1
-                                      ? std::string("one pass counts")
-                                      : fmt::format("it counts as passed after {} passes in a row",
-                                                    state.passes_needed)));
+  return print_answer(
+      context, options.json, json,
+      fmt::format(
+          "{}: {}; {}\n", printable(serial), state.may_start ? "may be measured" : state.reason,
+          state.passes_needed == 1
+              ? std::string("one pass counts")
+              : fmt::format("it counts as passed after {} passes in a row", state.passes_needed)));
 }
 
 void add_decision_options(CLI::App& command, CheckUnitCommandOptions& options) {
@@ -184,7 +186,7 @@ void add_check_unit(CLI::App& app, Context& context) {
     auto [command, options] = add_command<CheckUnitCommandOptions>(
         group, context, "check-unit", name, about,
         [action, done](const CheckUnitCommandOptions& its, Context& here) {
-          return decide(its, here, "check-unit", action, printable(its.serial) + done);
+          return decide(its, here, "check-unit", action, done);
         });
     command.add_option("SERIAL", options.serial)->required();
     add_decision_options(command, options);
@@ -196,9 +198,9 @@ void add_check_unit(CLI::App& app, Context& context) {
     }
   };
   add_action("add", "from now on this unit checks the station", "check_unit",
-             " is a check unit now");
+             "is a check unit now");
   add_action("remove", "this unit is no longer a check unit", "check_unit_end",
-             " is no longer a check unit");
+             "is no longer a check unit");
   auto [chart, options] = add_state(group, context, "check-unit", "chart",
                                     "individuals and moving range charts; exit 1: locked");
   chart.add_option("--html", options.html, "the charts as a page");

@@ -220,7 +220,9 @@ Status read_setting(std::string_view setting, std::set<std::string_view>& seen, 
   const std::string_view key = setting.substr(0, equals);
   const std::string_view value = setting.substr(equals + 1);
   if (!seen.insert(key).second) {
-    return wrong(key, value, "given once");
+    return fail(ErrorCode::usage,
+                fmt::format("virtual unit: {} is given twice", printable(key, 40)), {},
+                "give it once");
   }
   const auto known = std::find_if(kSettings.begin(), kSettings.end(),
                                   [key](const Setting& entry) { return entry.key == key; });

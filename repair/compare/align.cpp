@@ -20,10 +20,15 @@ constexpr double kBlock_s = 60;
 constexpr double kShortestBlock_s = 10;
 constexpr double kBlocksOfARecording = 20;
 constexpr std::size_t kMaxBlocks = 60;
-constexpr double kFineReach_s = 2;      // about the lag found to the second
-constexpr double kNearBest = 0.6;       // of the best correlation: lags to the second worth a look
-constexpr std::size_t kMostCoarse = 8;  // of these
-constexpr double kSureFit = 0.8;  // mean correlation of the minutes: no other lag is looked at
+constexpr double kFineReach_s = 2;       // about the lag that swelling and fading gave
+constexpr double kCoarseHop_s = 0.25;    // swelling by whole seconds does not see lags of half ones
+constexpr double kNearBest = 0.6;        // of the best correlation: coarse lags worth a look
+constexpr std::size_t kMostCoarse = 32;  // of these
+constexpr double kCoarseApart_s = 1;     // those nearer to a better one are looked at with it
+// Cubic interpolation halfway between samples keeps 0.64 of their noise: so much may lags that fit
+// equally well differ in what does not fit (1 - correlation).
+constexpr double kAlike = 1 / 0.64;
+constexpr double kLeastMisfit = 1e-3;     // the least that is told apart
 constexpr double kGoodCorrelation = 0.5;  // below, a minute does not fit at all
 constexpr double kRivalFactor = 0.85;     // peaks this close to a minute's best are rivals
 constexpr std::size_t kMaxRivals = 12;
@@ -69,11 +74,12 @@ class Correlation {
   double xy_ = 0;
 };
 
-// How much the second from each step on moves, for steps of hop_s from the whole second before the
-// trace's start. The logarithm lets rest and gentle motion have a say beside the wildest shaking.
-std::vector<float> motion_of(const Trace& trace, double hop_s) {
+// How much the second from each step on moves, for steps of hop_s from shift_s behind the whole
+// second before the trace's start. The logarithm lets rest and gentle motion have a say beside the
+// wildest shaking.
+std::vector<float> motion_of(const Trace& trace, double hop_s, double shift_s = 0) {
   std::vector<float> motion;
-  const double start_s = std::floor(trace.start_s());
+  const double start_s = std::floor(trace.start_s()) + shift_s;
   const auto steps = static_cast<std::size_t>((trace.end_s() - start_s) / hop_s);
   motion.reserve(steps);
   for (std::size_t i = 0; i < steps; ++i) {
@@ -84,11 +90,13 @@ std::vector<float> motion_of(const Trace& trace, double hop_s) {
 }
 
 // The lags about `about_s`, in steps of hop_s, at which the motions fit, the best first; of the
-// others those that come near it; none beyond max_lag_s. None where the best is no fit.
+// others those that come near it, a second and more from a better one; none beyond max_lag_s. None
+// where the best is no fit.
 std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, double about_s,
                                 double reach_s, double max_lag_s) {
-  const std::vector<float> motion_a = motion_of(a, hop_s);
+  const std::vector<float> motion_a = motion_of(a, 1);
   const std::vector<float> motion_b = motion_of(b, hop_s);
+  const auto hops_per_second = static_cast<std::ptrdiff_t>(std::llround(1 / hop_s));
   const auto offset = static_cast<std::ptrdiff_t>(
       std::llround((std::floor(a.start_s()) - std::floor(b.start_s()) + about_s) / hop_s));
   const auto reach = static_cast<std::ptrdiff_t>(std::llround(reach_s / hop_s));
@@ -96,15 +104,14 @@ std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, do
   for (std::ptrdiff_t lag = -reach; lag <= reach; ++lag) {
     Correlation correlation;
     for (std::ptrdiff_t i = 0; i < std::ssize(motion_a); ++i) {
-      const std::ptrdiff_t j = i + offset + lag;
+      const std::ptrdiff_t j = i * hops_per_second + offset + lag;
       if (j >= 0 && j < std::ssize(motion_b)) {
         correlation.add(motion_a[static_cast<std::size_t>(i)],
                         motion_b[static_cast<std::size_t>(j)]);
       }
     }
     // Few seconds in common correlate well by chance.
-    values.push_back(static_cast<double>(correlation.count()) * hop_s >= 10 ? correlation.value()
-                                                                            : 0);
+    values.push_back(correlation.count() >= 10 ? correlation.value() : 0);
   }
   const double best = std::ranges::max(values);
   if (best < 0.2) {
@@ -129,16 +136,21 @@ std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, do
   }
   std::ranges::sort(peaks, std::greater<>());
   std::vector<double> lags;
-  for (std::size_t i = 0; i < std::min(peaks.size(), kMostCoarse); ++i) {
-    lags.push_back(peaks[i].second);
+  for (const auto& [value, lag_s] : peaks) {
+    if (lags.size() < kMostCoarse && std::ranges::none_of(lags, [&](double better_s) {
+          return std::abs(better_s - lag_s) < kCoarseApart_s;
+        })) {
+      lags.push_back(lag_s);
+    }
   }
   return lags;
 }
 
-// To some tenths of a second, about a lag that is known to a second.
-double tenths_of(const Trace& a, const Trace& b, double second_s, double max_lag_s) {
-  const auto tenth = motion_lags(a, b, 0.1, std::round(second_s), kFineReach_s, max_lag_s);
-  return tenth.empty() ? second_s : tenth.front();
+// To some tenths of a second, about a lag that is known less well.
+double tenths_of(const Trace& a, const Trace& b, double coarse_s, double max_lag_s) {
+  const auto tenth =
+      motion_lags(a, b, 0.1, std::round(10 * coarse_s) / 10, kCoarseApart_s, max_lag_s);
+  return tenth.empty() ? coarse_s : tenth.front();
 }
 
 // That unrelated motions swell and fade so much alike at any of the lags tried. Neighbouring
@@ -147,7 +159,8 @@ double tenths_of(const Trace& a, const Trace& b, double second_s, double max_lag
 // swells a little alike within it too.
 double swell_chance(const Trace& a, const Trace& b, double lag_s, double limit_s) {
   const std::vector<float> motion_a = motion_of(a, 1);
-  const std::vector<float> motion_b = motion_of(b, 1);
+  const auto here_s = static_cast<std::ptrdiff_t>(std::llround(lag_s));
+  const std::vector<float> motion_b = motion_of(b, 1, lag_s - static_cast<double>(here_s));
   const auto correlation_of = [](const std::vector<float>& x, const std::vector<float>& y,
                                  std::ptrdiff_t shift) {
     Correlation correlation;
@@ -160,7 +173,6 @@ double swell_chance(const Trace& a, const Trace& b, double lag_s, double limit_s
   };
   const auto offset =
       static_cast<std::ptrdiff_t>(std::floor(a.start_s()) - std::floor(b.start_s()));
-  const auto here_s = static_cast<std::ptrdiff_t>(std::llround(lag_s));
   const Correlation both = correlation_of(motion_a, motion_b, offset + here_s);
   const auto reach = static_cast<std::ptrdiff_t>(limit_s + kSwellMemory_s);
   for (std::ptrdiff_t other_s = -reach; other_s <= reach; ++other_s) {
@@ -242,19 +254,31 @@ double block_correlation(const Trace& a, const Trace& b, const Block& block, dou
   return 2 * correlation.count() > block.end - block.begin ? correlation.value() : 0;
 }
 
-// Adds every lag up to limit_s at which this block fits about as well as it ever does there, and
-// says how well that is: 0 where it does not fit.
-double add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
-                      double about_s, double limit_s, std::vector<Candidate>& candidates) {
-  const double step_s = 1 / std::max(a.rate_hz(), b.rate_hz());
-  const auto reach = static_cast<int>(kFineReach_s / step_s);
+// Adds every lag up to limit_s at which this block fits about as well as it ever does there.
+void add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
+                    double about_s, double limit_s, std::vector<Candidate>& candidates) {
+  // A's step is a whole number of steps, so that B is interpolated once for all lags.
+  const auto finer = static_cast<std::size_t>(std::ceil(b.rate_hz() / a.rate_hz()));
+  const double step_s = 1 / (a.rate_hz() * static_cast<double>(finer));
+  const auto reach = static_cast<std::size_t>(kFineReach_s / step_s);
+  const std::size_t samples = block.end - block.begin;
+  const double from_s = a.start_s() + static_cast<double>(block.begin) / a.rate_hz() + about_s -
+                        static_cast<double>(reach) * step_s;
+  std::vector<double> theirs;
+  for (std::size_t i = 0; i <= (samples - 1) * finer + 2 * reach; ++i) {
+    theirs.push_back(b.at(from_s + static_cast<double>(i) * step_s));
+  }
   std::vector<double> values;
-  for (int k = -reach; k <= reach; ++k) {
-    values.push_back(block_correlation(a, b, block, about_s + k * step_s));
+  for (std::size_t k = 0; k <= 2 * reach; ++k) {
+    Correlation correlation;
+    for (std::size_t i = 0; i < samples; ++i) {
+      correlation.add(a.magnitude_g(block.begin + i), theirs[i * finer + k]);
+    }
+    values.push_back(2 * correlation.count() > samples ? correlation.value() : 0);
   }
   const double best = *std::ranges::max_element(values);
   if (best < kGoodCorrelation) {
-    return 0;
+    return;
   }
   std::vector<Candidate> found;
   for (std::size_t k = 1; k + 1 < values.size(); ++k) {
@@ -266,7 +290,8 @@ double add_candidates(const Trace& a, const Trace& b, const Block& block, std::s
     }
     const double bend = left - 2 * here + right;
     const double shift = bend < 0 ? 0.5 * (left - right) / bend : 0;
-    const double lag_s = about_s + (static_cast<double>(k) - reach + shift) * step_s;
+    const double lag_s =
+        about_s + (static_cast<double>(k) - static_cast<double>(reach) + shift) * step_s;
     if (std::abs(lag_s) <= limit_s) {
       found.push_back({index, lag_s, here});
     }
@@ -274,7 +299,6 @@ double add_candidates(const Trace& a, const Trace& b, const Block& block, std::s
   std::ranges::sort(found, std::greater<>(), &Candidate::correlation);
   found.resize(std::min(found.size(), kMaxRivals));
   candidates.insert(candidates.end(), found.begin(), found.end());
-  return found.empty() ? 0 : best;
 }
 
 // The line that most blocks agree on: for every drift, lags corrected for it fall into bins; bins
@@ -443,7 +467,7 @@ LineFit fit_line(const std::vector<std::pair<double, double>>& points, bool with
 // How likely it is that each block that fits somewhere has one of its good lags by the line, where
 // its lags are anywhere within reach_s.
 Agreement agreement_of(const std::vector<Candidate>& candidates, const std::vector<Block>& blocks,
-                       const LineFit& fit, std::size_t looked_at, double reach_s, bool with_drift) {
+                       const LineFit& fit, std::size_t rank, double reach_s, bool with_drift) {
   Agreement agreement;
   agreement.agreeing = fit.agreeing;
   std::map<std::size_t, std::size_t> lags_of;
@@ -459,11 +483,69 @@ Agreement agreement_of(const std::vector<Candidate>& candidates, const std::vect
   // The width of what agrees is taken from the parts themselves: of its halvings the k-th is worth
   // one in (k + 1)(k + 2), which is 1 for all of them.
   const double halvings = std::log2(2 * kInlier_s / fit.half_width_s);
-  // A line three standard errors from where swelling fits has no votes.
-  agreement.lines_tried = static_cast<double>(looked_at) *
+  // So is one of the lags that swelling gave. A line three standard errors from it has no votes.
+  const auto lag = static_cast<double>(rank);
+  agreement.lines_tried = (lag + 1) * (lag + 2) *
                           std::max(1.0, std::min(reach_s, 3 * kSwellTrust_s) / fit.half_width_s) *
                           slopes * (halvings + 1) * (halvings + 2);
   return agreement;
+}
+
+// The line near a lag.
+struct Fitted {
+  Line line;
+  LineFit fit;
+  Agreement agreement;  // without the swelling
+  double rival_s = 0;   // as of vote()
+};
+
+// Of all samples: where a steady tone begins and ends tells one of its periods from the next.
+double whole_correlation(const Trace& a, const Trace& b, const Line& line) {
+  Correlation correlation;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double time_s = a.start_s() + static_cast<double>(i) / a.rate_hz();
+    correlation.add(a.magnitude_g(i), b.at(time_s + line.at(time_s)));
+  }
+  return correlation.value();
+}
+
+// Nothing where no block fits near `about_s`, the lag that swelling gave (0 where it gave none), the
+// rank-th best by it.
+std::optional<Fitted> fitted_near(const Trace& a, const Trace& b, const std::vector<Block>& blocks,
+                                  std::optional<double> about_s, double limit_s, std::size_t rank) {
+  Fitted fitted;
+  const double half_span_s = (blocks.back().middle_s - blocks.front().middle_s) / 2;
+  // Away from the middle a clock may have drifted beyond the limit.
+  const double block_limit_s = limit_s + kMaxDrift_ppm * 1e-6 * half_span_s;
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    add_candidates(a, b, blocks[i], i, about_s.value_or(0), block_limit_s, candidates);
+  }
+  if (candidates.empty()) {
+    return std::nullopt;
+  }
+  const bool with_drift = 2 * half_span_s >= kLongEnoughForDrift_s;
+  fitted.line = vote(candidates, blocks, (blocks.front().middle_s + blocks.back().middle_s) / 2,
+                     with_drift, about_s, fitted.rival_s);
+  std::vector<std::pair<double, double>> points;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    // A part that fitted nowhere is no witness: it would agree without a chance of its own.
+    if (std::ranges::find(candidates, i, &Candidate::block) == candidates.end()) {
+      continue;
+    }
+    const Block& block = blocks[i];
+    const auto lag = refined_lag(a, b, block, fitted.line.at(block.middle_s));
+    if (lag && block_correlation(a, b, block, *lag) >= kGoodCorrelation) {
+      points.emplace_back(block.middle_s, *lag);
+    }
+  }
+  if (!points.empty()) {
+    fitted.fit = fit_line(points, with_drift, fitted.line);
+    // By the limit the lags may be closer together than the search reaches.
+    const double reach_s = std::min(kFineReach_s, block_limit_s);
+    fitted.agreement = agreement_of(candidates, blocks, fitted.fit, rank, reach_s, with_drift);
+  }
+  return fitted;
 }
 
 }  // namespace
@@ -497,73 +579,60 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
     return line;
   }
   // By how the motion swells and fades, which the period of a tone cannot mislead.
-  const auto seconds = motion_lags(a, b, 1, 0, std::ceil(options.max_lag_s), options.max_lag_s);
-  if (seconds.empty() && blocks.size() > 1) {
+  const auto coarse =
+      motion_lags(a, b, kCoarseHop_s, 0, std::ceil(options.max_lag_s), options.max_lag_s);
+  if (coarse.empty() && blocks.size() > 1) {
     result.remarks.push_back(fmt::format(
         "the motions do not fit at any lag up to {:.0f} s: were the units moved together?",
         options.max_lag_s));
     return line;
   }
+  const double limit_s = options.max_lag_s + 1 / std::min(a.rate_hz(), b.rate_hz());
   // Motion that goes on and off by a period swells alike at several lags: its minutes fit best at
   // the right one.
-  std::vector<Candidate> candidates;
-  std::optional<double> coarse;
-  double best = 0;
-  std::size_t looked_at = 0;
-  const double half_span_s = (blocks.back().middle_s - blocks.front().middle_s) / 2;
-  const double limit_s = options.max_lag_s + 1 / std::min(a.rate_hz(), b.rate_hz());
-  // Away from the middle a clock may have drifted beyond the limit.
-  const double block_limit_s = limit_s + kMaxDrift_ppm * 1e-6 * half_span_s;
-  for (std::size_t i = 0; i < std::max<std::size_t>(seconds.size(), 1) && best < kSureFit; ++i) {
-    const double about_s = seconds.empty() ? 0 : tenths_of(a, b, seconds[i], options.max_lag_s);
-    ++looked_at;
-    std::vector<Candidate> here;
-    double fit = 0;
-    for (std::size_t n = 0; n < blocks.size(); ++n) {
-      fit += add_candidates(a, b, blocks[n], n, about_s, block_limit_s, here) /
-             static_cast<double>(blocks.size());
-    }
-    if (fit > best) {
-      best = fit;
-      candidates = std::move(here);
-      coarse = seconds.empty() ? std::nullopt : std::optional(about_s);
+  std::vector<Fitted> found;
+  for (std::size_t i = 0; i < std::max<std::size_t>(coarse.size(), 1); ++i) {
+    const auto about_s = coarse.empty()
+                             ? std::nullopt
+                             : std::optional(tenths_of(a, b, coarse[i], options.max_lag_s));
+    if (auto fitted = fitted_near(a, b, blocks, about_s, limit_s, i)) {
+      found.push_back(std::move(*fitted));
     }
   }
-  if (candidates.empty()) {
+  if (found.empty()) {
     result.remarks.emplace_back("no lively minute fits: were the units moved together?");
     return line;
   }
-  line.middle_s = (blocks.front().middle_s + blocks.back().middle_s) / 2;
-  const bool with_drift = blocks.back().middle_s - blocks.front().middle_s >= kLongEnoughForDrift_s;
-  double rival_s = 0;
-  line = vote(candidates, blocks, line.middle_s, with_drift, coarse, rival_s);
-  std::vector<std::pair<double, double>> points;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    // A part that fitted nowhere is no witness: it would agree without a chance of its own.
-    if (std::ranges::find(candidates, i, &Candidate::block) == candidates.end()) {
-      continue;
-    }
-    const Block& block = blocks[i];
-    const auto lag = refined_lag(a, b, block, line.at(block.middle_s));
-    if (lag && block_correlation(a, b, block, *lag) >= kGoodCorrelation) {
-      points.emplace_back(block.middle_s, *lag);
-    }
-  }
-  LineFit fit;
-  Agreement agreement;
-  if (!points.empty()) {
-    fit = fit_line(points, with_drift, line);
-    // By the limit the lags may be closer together than the search reaches.
-    const double reach_s = std::min(kFineReach_s, block_limit_s);
-    agreement = agreement_of(candidates, blocks, fit, looked_at, reach_s, with_drift);
-    agreement.swelling = swell_chance(a, b, line.lag_s, limit_s);
-  }
-  if (!is_alignment(agreement, line.lag_s, limit_s)) {
+  // No other one swells more alike.
+  found.front().agreement.swelling = swell_chance(a, b, found.front().line.lag_s, limit_s);
+  const auto believed = std::ranges::partition(found, [limit_s](const Fitted& fitted) {
+    return is_alignment(fitted.agreement, fitted.line.lag_s, limit_s);
+  });
+  if (believed.begin() == found.begin()) {
+    const auto most = std::ranges::max_element(
+        found, {}, [](const Fitted& fitted) { return fitted.agreement.agreeing; });
     result.remarks.push_back(fmt::format(
         "{} of {} lively parts agree on a lag up to {:g} s, which chance does too: were the units "
         "moved together?",
-        agreement.agreeing, blocks.size(), options.max_lag_s));
+        most->agreement.agreeing, blocks.size(), options.max_lag_s));
     return {0, 0, a.start_s()};
+  }
+  found.erase(believed.begin(), found.end());
+  // Of the lags that chance does not give, the one at which the recordings fit best.
+  std::vector<double> misfit;
+  for (const Fitted& fitted : found) {
+    misfit.push_back(1 - whole_correlation(a, b, fitted.line));
+  }
+  const auto least = std::ranges::min_element(misfit);
+  const auto& [best_line, fit, agreement, near_s] =
+      found[static_cast<std::size_t>(least - misfit.begin())];
+  line = best_line;
+  double rival_s = near_s;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const double distance_s = std::abs(found[i].line.at(line.middle_s) - line.lag_s);
+    if (distance_s > 3 * kInlier_s && misfit[i] <= kAlike * std::max(*least, kLeastMisfit)) {
+      rival_s = std::max(rival_s, distance_s);
+    }
   }
   result.aligned = true;
   const double part_s =

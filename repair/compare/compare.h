@@ -11,12 +11,13 @@
 //
 //  - Everything is done on the vector magnitude, which does not care how a unit lies.
 //  - Alignment in time: how the motion swells and fades (standard deviation within a second) is
-//    correlated first, to some tenths of a second; then up to 60 lively minutes (of less than
-//    twenty minutes, twentieths) are correlated to a fraction of a sample, each by itself; a
-//    straight line through their lags gives lag and drift.
+//    correlated first, to some tenths of a second; then, at up to 32 lags that this gives, up to 60
+//    lively minutes (of less than twenty minutes, twentieths) are correlated to a fraction of a
+//    sample, each by itself; a straight line through their lags gives lag and drift.
 //    A minute of steady shaking fits at every period; therefore every good peak of every minute is
 //    a candidate, and the line wins that most of them agree on near the first lag. It is believed
-//    where chance does not let so many agree (align.h has the rule as a table).
+//    where chance does not let so many agree (align.h has the rule as a table). Of the lines that
+//    are believed the one wins at which the whole recordings correlate best.
 //  - Envelopes: per second the largest and the smallest magnitude, of each unit's own samples.
 //    Their differences are the errors of the paper's histograms; they do not depend on where within
 //    a vibration the samples fall.
@@ -73,7 +74,7 @@ struct PairComparison {
   double lag_at_s = 0;
   double drift_ppm = 0;
   // The error of lag_s is smaller in 99 of 100 cases; where the motion is periodic, the distance of
-  // the next lag that fits nearly as well. 0 only where it is not aligned.
+  // the farthest lag that fits nearly as well (a remark says so). 0 only where it is not aligned.
   double lag_uncertainty_s = 0;
   // By the table in align.h. false: nothing moved, or what fitted fits by chance; then lag_s is 0.
   bool aligned = false;

@@ -103,7 +103,7 @@ struct NumberFormat {
   enum class Rounding { half_away, toward_zero, down };
   Rounding rounding = Rounding::half_away;
   bool wraps = false;  // overflows modulo 4096 instead of clipping
-  // The sensor clips here, behind its gain and zero: a g is what a nominal sensor's counts of 1 g are.
+  // The sensor clips where so many g would be stored: a recording piles up there.
   double limit_g = std::numeric_limits<double>::infinity();
 
   double limited(double value_g) const { return std::clamp(value_g, -limit_g, limit_g); }

@@ -11,10 +11,11 @@ TEST(GravityOption, AnswersByItsTable) {
   EXPECT_FALSE(local_gravity({}).value()) << "gravity is unknown";
   EXPECT_NEAR(local_gravity({{}, 0.0, 0}).value()->m_per_s2, 9.7803253359, 1e-9);
   EXPECT_NEAR(local_gravity({{}, 90.0, 0}).value()->m_per_s2, 9.8321849378, 1e-9);
-  EXPECT_DOUBLE_EQ(local_gravity({9.81, 90.0, 0}).value()->m_per_s2, 9.81) << "--gravity first";
+  EXPECT_DOUBLE_EQ(local_gravity({9.81, {}, {}}).value()->m_per_s2, 9.81);
+  EXPECT_FAILS(local_gravity({9.78, 10.0, {}}), ErrorCode::usage);
   EXPECT_NEAR(local_gravity({{}, 90.0, {}}).value()->m_per_s2, 9.8321849378, 1e-9);
   EXPECT_FAILS(local_gravity({{}, {}, 500}), ErrorCode::usage);  // an altitude alone
-  EXPECT_FAILS(local_gravity({9.0, {}, 0}), ErrorCode::usage);
+  EXPECT_FAILS(local_gravity({9.0, {}, {}}), ErrorCode::usage);
   EXPECT_FAILS(local_gravity({{}, 91.0, 0}), ErrorCode::usage);
 }
 

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "expect_result.h"
 
@@ -31,11 +31,17 @@ TEST(Gravity, Height) {
 // The table of gravity.h.
 TEST(Gravity, WhatIsGivenSaysWhatItIs) {
   EXPECT_FALSE(local_gravity({}).value()) << "gravity is unknown";
-  EXPECT_EQ(local_gravity({9.81, 90.0, 500}).value()->m_per_s2, 9.81) << "what was measured first";
+  EXPECT_EQ(local_gravity({9.81, {}, {}}).value()->m_per_s2, 9.81);
+  for (const GravityGiven& both :
+       {GravityGiven{9.78, 10.0, {}}, GravityGiven{9.81, 90.0, 500}, GravityGiven{9.81, {}, 500}}) {
+    const auto refused = local_gravity(both);
+    EXPECT_FAILS(refused, ErrorCode::usage);
+    EXPECT_THAT(refused.error().hint, testing::HasSubstr("give one"));
+  }
   EXPECT_EQ(local_gravity({{}, 48.0, 500}).value()->m_per_s2, gravity_at(48, 500)->m_per_s2);
   EXPECT_EQ(local_gravity({{}, 48.0, {}}).value()->m_per_s2, gravity_at(48, 0)->m_per_s2);
   EXPECT_FAILS(local_gravity({{}, {}, 500}), ErrorCode::usage);
-  EXPECT_FAILS(local_gravity({9.0, 48.0, 0}), ErrorCode::usage);
+  EXPECT_FAILS(local_gravity({9.0, {}, {}}), ErrorCode::usage);
   EXPECT_FAILS(local_gravity({{}, 91.0, 0}), ErrorCode::usage);
 }
 

@@ -77,7 +77,9 @@ TEST_F(StoreTest, CorrectionsAreSaidWithTheirReason) {
   const auto constants = [&] {
     return run({"history", "MOS2A1", "--store", path("a.db"), "--json"}).json()["constants"][0];
   };
+  EXPECT_EQ(correct({"reinstate", id, "--reason", "x"}), 78) << "they apply";
   EXPECT_EQ(correct({"withdraw", id, "--reason", "wrong jig"}), 0);
+  EXPECT_EQ(correct({"withdraw", id, "--reason", "wrong jig"}), 78) << "done already";
   EXPECT_EQ(constants()["withdrawn"], true);
   EXPECT_EQ(correct({"reinstate", id, "--reason", "it was right"}), 0);
   EXPECT_EQ(constants()["withdrawn"], false);
@@ -90,6 +92,37 @@ TEST_F(StoreTest, CorrectionsAreSaidWithTheirReason) {
   EXPECT_EQ(history["corrections"][2]["about"]["table"], "units");
   EXPECT_EQ(history["corrections"][2]["reason"], "came back twice");
   EXPECT_EQ(history["repairs"][0]["input"], "a.gt3x");
+}
+
+// As 'scan' and 'inspect' take it.
+TEST_F(StoreTest, AUnitIsFoundInSmallLettersToo) {
+  fill("a.db");
+  const auto add = [&](const std::string& serial) {
+    auto store = db::Store::open(posix_env(), path("a.db")).value();
+    db::ConstantsRecord record;
+    record.serial = serial;
+    record.filter = "current";
+    record.made_at = from_unix_seconds(2000);
+    record.document = "{}";
+    EXPECT_OK(store.add_constants(record, "w"));
+  };
+  add("MOS2A45130007");
+  for (const char* serial : {"mos2a45130007", "MOS2A45130007"}) {
+    const auto history = run({"history", serial, "--store", path("a.db"), "--json"});
+    EXPECT_EQ(history.exit_code, 0) << history.people;
+    EXPECT_EQ(history.json()["serial"], "MOS2A45130007");
+    const auto trend = run({"store", "trend", serial, "--store", path("a.db"), "--json"});
+    EXPECT_EQ(trend.exit_code, 0) << trend.people;
+    EXPECT_EQ(trend.json()["serial"], "MOS2A45130007");
+    const auto note = run(
+        {"store", "note", "units", serial, "--why", "cracked", "--store", path("a.db"), "--json"});
+    EXPECT_EQ(note.exit_code, 0) << note.people;
+    EXPECT_EQ(note.json()["about"]["id"], "MOS2A45130007");
+  }
+  add("mos2a45130008");
+  const auto stored = run({"history", "mos2a45130008", "--store", path("a.db"), "--json"});
+  EXPECT_EQ(stored.json()["serial"], "mos2a45130008") << "a store that has it so";
+  EXPECT_EQ(run({"history", "mos2a45130009", "--store", path("a.db")}).exit_code, 66);
 }
 
 // Stores that cannot be used: the exit code of the contract, and a message that names the place.

@@ -52,6 +52,12 @@ TEST(VirtualSettings, WhatIsLeftOutComesFromTheSeed) {
   EXPECT_FALSE(one->with_jig);
 }
 
+TEST(VirtualSettings, SaysWhatIsGivenTwice) {
+  const auto twice = parse_virtual_settings("seed=7,seed=8", 1);
+  EXPECT_FAILS(twice, ErrorCode::usage);
+  EXPECT_EQ(twice.error().what, "virtual unit: seed is given twice");
+}
+
 TEST(VirtualSettings, RefusesWhatItDoesNotKnow) {
   for (const char* text : {"speed=7",
                            "seed",

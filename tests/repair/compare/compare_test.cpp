@@ -113,6 +113,7 @@ TEST(Compare, RealUnitsOnOneShaker) {
   EXPECT_TRUE(result->aligned);
   EXPECT_GT(result->minutes_used, 10U);
   EXPECT_NEAR(result->lag_s, -0.57, 0.06);
+  EXPECT_LT(result->lag_uncertainty_s, 0.5) << "one period of 2 Hz";
   EXPECT_LT(std::abs(result->drift_ppm), 60);
   EXPECT_GT(result->overlap_s, 2000);
   // The other way round is the same with the sign turned.

@@ -55,6 +55,17 @@ inline double integer_under(const char* name, double value_lsb) {
   return format.to_integer(value_lsb, -2048, 2047, clipped);
 }
 
+// A unit without noise or error, whose counts are those of its sensor.
+inline sim::UnitTruth unit_of_256_lsb_per_g() {
+  sim::UnitTruth unit;
+  unit.serial = "MOS2A45130007";
+  unit.firmware = "1.5.0";
+  unit.constants = {{256, 256, 256}, {-256, -256, -256}, {0, 0, 0}};
+  unit.current = {{256, 256, 256}, {0, 0, 0}};
+  unit.noise_mg = {};
+  return unit;
+}
+
 // Two seconds at rest, with this direction up, of a unit without noise.
 inline sim::SimulatedBlock run(const char* name, const sim::ParameterSet& given,
                                const Eigen::Vector3d& up, double temperature_c = 25) {

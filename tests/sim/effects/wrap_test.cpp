@@ -1,5 +1,7 @@
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -28,6 +30,24 @@ TEST(Wrap, CountsOverflowModulo4096) {
     EXPECT_LE(std::min(off, 4096 - off), 6) << i;
   }
   EXPECT_TRUE(over);
+}
+
+// Of a unit in free motion. Oracle: what acts, in counts, modulo 4096.
+TEST(Wrap, ARecordingOverflowsAsABundleDoes) {
+  const auto motion = shaker(Eigen::Matrix3d::Identity(), {Eigen::Vector3d(0, 0, 1), 2, 11, 0});
+  std::vector<std::unique_ptr<Effect>> effects;
+  effects.push_back(made_effect("wrap"));
+  Simulator simulator(unit_of_256_lsb_per_g(), {}, *motion, std::move(effects));
+  SimulatedBlock block;
+  simulator.next(600, block);
+  std::size_t over = 0;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const auto lsb = static_cast<int>(std::lround(256 * block.true_g[i].z()));
+    over += lsb < -2048 || lsb > 2047 ? 1 : 0;
+    EXPECT_EQ(block.stored[i][2], ((lsb + 2048) % 4096 + 4096) % 4096 - 2048) << i;
+  }
+  EXPECT_GT(over, 100U);
+  EXPECT_EQ(simulator.clipped(), 0U);
 }
 
 // Oracle: 12 bits of two's complement, by hand.
