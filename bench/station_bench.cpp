@@ -476,7 +476,9 @@ int orders_on_a_wrong_unit(int orders, std::uint64_t first_seed, int& runs) {
                              measured.push_back(report.serial);
                              return RunInStore{{"abc", {}}, false, {}};
                            },
-                           [](const CaptureReport&) -> Result<std::string> { return "def"; })
+                           [](const CaptureReport&) {
+                             return KeptConstants{"def", {}};
+                           })
                            .value();
     const auto wait_until = [](const auto& ready) {
       for (int wait = 0; wait < 4000 && !ready(); ++wait) {
