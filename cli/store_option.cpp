@@ -196,9 +196,8 @@ Status write_constants(FileSystem& files, const std::string& path,
 namespace {
 
 Result<SavedConstants> save_in_store(Context& context, const std::string& location,
-                                     const calib::ConstantsRecord& record,
+                                     Result<db::Store>& store, const calib::ConstantsRecord& record,
                                      const std::string& model) {
-  auto store = open_store(context, location);
   SavedConstants done;
   SIXPOINT_ASSIGN(
       done.place, keep_records(context, location, store, [&](db::RecordWriter& writer) -> Status {
@@ -218,10 +217,10 @@ Result<SavedConstants> save_in_store(Context& context, const std::string& locati
 }  // namespace
 
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,
-                                      const std::string& location,
+                                      const std::string& location, Result<db::Store>& store,
                                       const calib::ConstantsRecord& record,
                                       const std::string& model, const std::string& path) {
-  auto saved = save_in_store(context, location, record, model);
+  auto saved = save_in_store(context, location, store, record, model);
   Status written = write_constants(files, path, record);
   if (!saved) {
     if (!written) {
@@ -236,13 +235,14 @@ Result<SavedConstants> save_constants(Context& context, FileSystem& files,
 }
 
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
-                                    const station::CaptureReport& report, const std::string& path) {
+                                    Result<db::Store>& store, const station::CaptureReport& report,
+                                    const std::string& path) {
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
   origin.file = db::storable_path(file_name_of(report.file));
   origin.kind = "calibration_file";
   SIXPOINT_ASSIGN(const auto record, calib::record_of(*report.solved, env.clock.now(), origin));
-  return save_constants(context, env.files, location, record,
+  return save_constants(context, env.files, location, store, record,
                         std::string(gt3x::model_of(record.serial)), path);
 }
 

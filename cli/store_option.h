@@ -103,11 +103,12 @@ struct SavedConstants {
 };
 // Also written to the file `path` of `files`. Neither stops the other.
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,
-                                      const std::string& location,
+                                      const std::string& location, Result<db::Store>& store,
                                       const calib::ConstantsRecord& record,
                                       const std::string& model, const std::string& path);
 // The same with those of a calibration file that was made just now, and the files of `env`.
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
-                                    const station::CaptureReport& report, const std::string& path);
+                                    Result<db::Store>& store, const station::CaptureReport& report,
+                                    const std::string& path);
 
 }  // namespace sixpoint::cli

@@ -81,8 +81,9 @@ Status keep(const std::string& path, const SolveCommandOptions& options,
                   calib::record_of(outcome.report, context.env.clock.now(), origin));
   const std::string file = to_file ? options.output : "";
   if (to_store && outcome.is_lent) {
-    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, outputs.files(), options.store, record,
-                                                  survey.model, file));
+    auto store = open_store(context, options.store);
+    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, outputs.files(), options.store, store,
+                                                  record, survey.model, file));
     return outcome.saved->file_problem ? Status(fail(*outcome.saved->file_problem)) : Status();
   }
   SIXPOINT_CHECK(write_constants(outputs.files(), file, record));

@@ -149,8 +149,9 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
   if (is_replay(options.device)) {
     done.report.notes.emplace_back("a replayed session is no measurement: no constants are stored");
   } else if (done.report.usable()) {
-    SIXPOINT_ASSIGN(done.saved,
-                    save_capture(context, env, options.store, done.report, options.constants_out));
+    store = open_store(context, options.store);  // minutes have gone by
+    SIXPOINT_ASSIGN(done.saved, save_capture(context, env, options.store, store, done.report,
+                                             options.constants_out));
     if (done.saved->file_problem) {
       report_error(context, *done.saved->file_problem);
     }

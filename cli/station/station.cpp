@@ -88,14 +88,14 @@ class StationStore {
 
   Result<db::Store> open() {
     const std::lock_guard lock(mutex_);
-    return open_store(context_, options_.store);
+    return opened();
   }
   Result<station::RetestState> may_start(const std::string& serial) {
     SIXPOINT_CHECK(station::check_jig_due(jig_due_, context_.env.clock.now()));
     const std::lock_guard lock(mutex_);
     // A store that does not answer is no reason not to measure: keep_records() has a journal, and
     // the station remembers its lock.
-    auto store = open_store(context_, options_.store);
+    auto store = opened();
     return guard_.may_start(store, serial, options_.station);
   }
   Result<std::optional<Error>> may_write(const station::WaitingConstants& waiting) {
@@ -110,7 +110,8 @@ class StationStore {
   // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
   Result<station::KeptConstants> add_constants(const station::CaptureReport& report) {
     const std::lock_guard lock(mutex_);
-    SIXPOINT_ASSIGN(auto saved, save_capture(context_, context_.env, options_.store, report,
+    auto store = opened();
+    SIXPOINT_ASSIGN(auto saved, save_capture(context_, context_.env, options_.store, store, report,
                                              report.file + ".constants.json"));
     return station::KeptConstants{std::move(saved.id), std::move(saved.file_problem)};
   }
@@ -120,6 +121,14 @@ class StationStore {
   Status print_again(const std::string& run_id);
 
  private:
+  // A store that was there and is not is on a disk that is away: no new one takes its place, and the
+  // journal keeps what is measured.
+  Result<db::Store> opened() {
+    auto store = was_there_ ? open_existing_store(context_, options_.store)
+                            : open_store(context_, options_.store);
+    was_there_ = was_there_ || store.has_value();
+    return store;
+  }
   void print_label(const db::RunRecord& run);
 
   Context context_;
@@ -129,6 +138,7 @@ class StationStore {
   station::StationGuard guard_;
   station::LabelPrinter* printer_ = nullptr;
   std::mutex mutex_;
+  bool was_there_ = false;  // the store
 };
 
 // A label that cannot be kept for the printer is no reason to lose the run: it can be printed
@@ -169,7 +179,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
   run.retest_of = labels.retest_of;
   station::complete_run_record(run, report, {}, labels.is_authenticated);
   station::RunInStore stored;
-  auto store = open_store(context_, options_.store);
+  auto store = opened();
   SIXPOINT_ASSIGN(
       const db::Saved saved,
       keep_records(context_, options_.store, store, [&](db::RecordWriter& writer) -> Status {
