@@ -36,6 +36,10 @@ for example in "${examples[@]}"; do
     line=$(sed "s/\b${word%%:*}\b/${word#*:}/g" <<<"$line")
   done
   expected=$(sed -n 's/.*# exits with \([0-9]*\).*/\1/p' <<<"$line")
+  case $line in  # each is refused where it is so already
+    "sixpoint store withdraw"*) sixpoint store reinstate "$constants" --why "measured again" &>/dev/null || true ;;
+    "sixpoint store reinstate"*) sixpoint store withdraw "$constants" --why "fell again" &>/dev/null || true ;;
+  esac
   case $line in
     "sixpoint virtual"* | "sixpoint station "*) line="timeout --preserve-status 5 $line" ;;
   esac
