@@ -136,7 +136,8 @@ std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, do
   }
   std::ranges::sort(peaks, std::greater<>());
   std::vector<double> lags;
-  for (const auto& [value, lag_s] : peaks) {
+  for (const auto& peak : peaks) {
+    const double lag_s = peak.second;
     if (lags.size() < kMostCoarse && std::ranges::none_of(lags, [&](double better_s) {
           return std::abs(better_s - lag_s) < kCoarseApart_s;
         })) {
@@ -605,10 +606,10 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
   }
   // No other one swells more alike.
   found.front().agreement.swelling = swell_chance(a, b, found.front().line.lag_s, limit_s);
-  const auto believed = std::ranges::partition(found, [limit_s](const Fitted& fitted) {
+  const auto end = std::partition(found.begin(), found.end(), [limit_s](const Fitted& fitted) {
     return is_alignment(fitted.agreement, fitted.line.lag_s, limit_s);
   });
-  if (believed.begin() == found.begin()) {
+  if (end == found.begin()) {
     const auto most = std::ranges::max_element(
         found, {}, [](const Fitted& fitted) { return fitted.agreement.agreeing; });
     result.remarks.push_back(fmt::format(
@@ -617,7 +618,7 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
         most->agreement.agreeing, blocks.size(), options.max_lag_s));
     return {0, 0, a.start_s()};
   }
-  found.erase(believed.begin(), found.end());
+  found.erase(end, found.end());
   // Of the lags that chance does not give, the one at which the recordings fit best.
   std::vector<double> misfit;
   for (const Fitted& fitted : found) {
