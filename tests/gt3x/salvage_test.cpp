@@ -283,6 +283,24 @@ TEST(Salvage, WhatIsRefusedStaysRefused) {
   }
 }
 
+// 199 names for 50 MB would be 10 GB of output. The entries' own headers have it once.
+TEST(Salvage, EntriesOfTheSameBytesAreRefused) {
+  std::vector<tests::MadeEntry> entries = {{"info.txt", text_bytes(made_info())},
+                                           {"log.bin", made_log(kSeconds)}};
+  for (const char* name : {"a", "b"}) {
+    entries.push_back({name, made_log(kSeconds)});
+    entries.back().listed_only = true;
+  }
+  const MadeArchive made(entries);
+  const auto refused = read_bytes(made.bytes, false);
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  EXPECT_THAT(refused.error().what, HasSubstr("overlap"));
+  const auto read = read_bytes(made.bytes, true);
+  ASSERT_OK(read);
+  EXPECT_EQ(read->seconds.size(), kSeconds);
+  EXPECT_TRUE(read->said("")) << "the list of entries";
+}
+
 TEST(Salvage, ASymbolicLinkIsRefused) {
   MadeArchive made({{"info.txt", text_bytes(made_info())},
                     {"log.bin", text_bytes("/etc/passwd"), false, false, 0, -1, 0120777U << 16U}});
