@@ -43,6 +43,8 @@ if (file.exists(affected)) {
   message("SKIPPED, NOT PASSED: ", affected, " is not there")
 }
 
+stopifnot(attr(read_gt3x_sixpoint("twice.gt3x"), "time_zone") == "-04:00:00")
+
 broken <- tempfile(fileext = ".gt3x")
 writeBin(raw(100), broken)
 error <- tryCatch(read_gt3x_sixpoint(broken), sixpoint_error = function(e) e)
