@@ -5,9 +5,10 @@ import unittest
 import zipfile
 
 import numpy as np
+import sixpoint
 from sixpoint.compat.pygt3x import FileReader
 
-from made import INFO, InFolder, packed, real, record, samples_of, small, write_recording
+from made import INFO, InFolder, many_gaps, packed, real, record, samples_of, small, write_recording
 
 START = 1_428_588_240
 
@@ -86,6 +87,10 @@ class Drop(InFolder):
             self.assertEqual((reader.info.stop_date, reader.info.start_date), (0, 635_641_850_400_000_000))
             self.assertEqual(reader.info.sample_rate, 30)
             self.assertIsInstance(reader.info.sample_rate, int)
+
+    def test_refuses_more_gaps_than_are_listed(self):
+        with self.assertRaisesRegex(sixpoint.BadDataError, "more than 10000 gaps"):
+            FileReader(many_gaps(self.folder)).__enter__()
 
 
 class Real(unittest.TestCase):

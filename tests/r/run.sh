@@ -32,6 +32,7 @@ for seed in 1 2; do
 done
 PYTHONPATH=$source_folder/tests/python python3 -c '
 from made import *
+many_gaps(".")
 write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")'
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.

@@ -18,6 +18,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
+from .._errors import BadDataError
 from .._recording import Recording, read
 
 if TYPE_CHECKING:
@@ -140,6 +141,15 @@ class FileReader:
 
     def __enter__(self) -> FileReader:
         recording = read(self.file_name, unit="g", dtype="float32")
+        listed = len(recording.gaps)
+        if recording.inspection.gap_count > listed:
+            # Which rows behind them are no samples is not known.
+            raise BadDataError(
+                "bad_data",
+                f"the recording has more than {listed} gaps",
+                recording.path,
+                "use sixpoint.read() with fill='none'",
+            )
         self._recording = recording
         self.info = Info.of(recording.info)
         self.nhanes = recording.inspection.form == "gt3x_old"
