@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
+#include "base/utf8.h"
 #include "db/chain.h"
 #include "db/name_rule.h"
 
@@ -23,33 +24,8 @@ constexpr std::size_t kLargestDocument = 64U << 20;
 // PostgreSQL takes 1 GiB, and an export writes twice as many hex digits on one line.
 constexpr std::size_t kLargestCapture = 100U << 20;
 
-// UTF-8 as RFC 3629 has it, without NUL: what both servers store unchanged.
-bool is_storable(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead == 0      ? 0
-                               : lead < 0x80  ? 1
-                               : lead < 0xC2  ? 0
-                               : lead < 0xE0  ? 2
-                               : lead < 0xF0  ? 3
-                               : lead <= 0xF4 ? 4
-                                              : 0;
-    if (length == 0 || i + length > text.size()) {
-      return false;
-    }
-    for (std::size_t k = 1; k < length; ++k) {
-      const auto byte = static_cast<unsigned char>(text[i + k]);
-      // The second byte rules out overlong forms, surrogates and what lies above U+10FFFF.
-      const unsigned low = k > 1 ? 0x80 : lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
-      const unsigned high = k > 1 ? 0xBF : lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
-      if (byte < low || byte > high) {
-        return false;
-      }
-    }
-    i += length;
-  }
-  return true;
-}
+// What both servers store unchanged.
+bool is_storable(std::string_view text) { return text.find('\0') == text.npos && is_utf8(text); }
 
 Status check_text(std::string_view text, std::size_t limit) {
   if (text.size() > limit || !is_storable(text)) {

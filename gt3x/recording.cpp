@@ -239,12 +239,18 @@ bool is_folder(EntryHeader& header) {
 
 Status Recording::Archive::read_list() {
   const zip_int64_t count = zip_get_num_entries(zip, 0);
+  std::uint64_t left = end;
   for (zip_int64_t i = 0; i < count; ++i) {
     const auto index = static_cast<zip_uint64_t>(i);
     SIXPOINT_ASSIGN(EntryHeader header, listed_header(index));
     if (!is_folder(header)) {
       SIXPOINT_CHECK(add_entry(header));
       listed.push_back(index);
+      if (header.packed_size > left) {
+        return bad("entries overlap: together they have more bytes than the archive",
+                   hint_about(Damage::no_directory));
+      }
+      left -= header.packed_size;
     }
   }
   return check_entries();

@@ -266,7 +266,8 @@ struct SampleReader::State {
     // Behind what was lost of a log no one knows what the unit did, and a clock that was set back is
     // another than that of the Last Sample Time: these are no gaps to be filled.
     if (!by_clock || final_gap_given || !last_time || !last_sample_time ||
-        *last_time < latest_time || recording.is_damaged("log.bin") ||
+        *last_time < latest_time ||
+        recording.is_damaged(form == RecordingForm::log ? "log.bin" : "activity.bin") ||
         *last_sample_time <= *last_time + std::uint64_t{1}) {
       return std::nullopt;
     }

@@ -220,7 +220,7 @@ char* sixpoint_reading_facts(const sixpoint_reading* reading, char** json) {
     all["facts"] = repair::inspection_to_json(*found, reading->path);
     all["info"] = Json::object();
     for (const auto& [key, value] : recording.info().pairs()) {
-      all["info"][key] = value;
+      all["info"].emplace(key, value);  // of a key that stands twice, the first
     }
     all["gaps"] = Json::array();
     for (const gt3x::Gap& gap : found->gaps) {

@@ -12,6 +12,14 @@ namespace sixpoint::gt3x {
 PackLine::PackLine(unsigned jobs, Sink sink)
     : sink_(std::move(sink)), packers_(std::max(jobs, 1U)), slots_(jobs > 1 ? jobs + 1 : 1U) {}
 
+PackLine::~PackLine() {
+  for (const Slot& slot : slots_) {
+    if (slot.done.valid()) {
+      slot.done.wait();
+    }
+  }
+}
+
 Status PackLine::write_oldest() {
   Slot& slot = slots_[written_++ % slots_.size()];
   if (slot.done.valid()) {
@@ -38,9 +46,10 @@ Status PackLine::put(Bytes& piece, PiecePacker::Place place) {
     if (begun_ >= packers_.size()) {
       before = slots_[(begun_ - packers_.size()) % slots_.size()].done;
     }
-    const auto pack = [&slot, &packer, place, before] {
+    auto pack = [&slot, &packer, place, before]() mutable {
       if (before.valid()) {
         before.wait();
+        before = {};  // else each piece would keep all before it
       }
       packer.pack(slot.piece, place, slot.packed);
     };

@@ -30,6 +30,10 @@ class PackLine {
   // Threads beside the calling one; 1: the calling one packs, and also where the system gives no
   // more threads.
   PackLine(unsigned jobs, Sink sink);
+  // Waits for the threads, also where not all was written.
+  ~PackLine();
+  PackLine(const PackLine&) = delete;
+  PackLine& operator=(const PackLine&) = delete;
 
   // Takes the bytes of `piece` along, and leaves others there, whose memory is used again.
   Status put(Bytes& piece, PiecePacker::Place place);
@@ -39,7 +43,7 @@ class PackLine {
   struct Slot {
     Bytes piece;
     Bytes packed;
-    std::shared_future<void> done;  // its end waits for the thread that uses the above
+    std::shared_future<void> done;
   };
   Status write_oldest();
 

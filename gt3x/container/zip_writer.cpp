@@ -6,6 +6,7 @@
 
 #include <isa-l/crc.h>
 
+#include "base/utf8.h"
 #include "gt3x/container/pack_line.h"
 #include "gt3x/container/zip_format.h"
 
@@ -57,7 +58,7 @@ std::uint16_t method_of(Packing packing) { return packing == Packing::store ? kS
 std::uint16_t flags_of(const std::string& name, bool described_behind) {
   const bool ascii = std::ranges::all_of(name, [](char c) { return (c & 0x80) == 0; });
   return static_cast<std::uint16_t>((described_behind ? zip::kDescribedBehind : 0) |
-                                    (ascii ? 0 : kUtf8Name));
+                                    (!ascii && is_utf8(name) ? kUtf8Name : 0));
 }
 
 std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t before) {

@@ -52,7 +52,9 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
                   fmt::format("the recording is longer than {} samples", kMaxTraceSamples), path,
                   "compare recordings of hours, not of weeks");
     }
-    trace.magnitude_g_.resize(first + count, kMissing);
+    if (trace.magnitude_g_.size() < first + count) {  // not where the clock leapt back
+      trace.magnitude_g_.resize(first + count, kMissing);
+    }
     for (std::size_t i = 0; i < count; ++i) {
       double square = 0;
       for (const std::int16_t value : item->counts[i]) {

@@ -255,9 +255,9 @@ class Repair {
   }
 
   // A damaged file whose samples stay as they are is written whole all the same; its status says
-  // nothing else than without that.
+  // nothing else than without that. The old form has no log, into which its mark would be written.
   bool write_whole() {
-    if (report_.losses.empty() || survey_.samples == 0) {
+    if (report_.losses.empty() || survey_.samples == 0 || survey_.log.bytes == 0) {
       return false;
     }
     report_.method = kSalvageMethod;

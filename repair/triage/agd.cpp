@@ -1,13 +1,10 @@
 #include "repair/triage/agd.h"
 
-#include <cerrno>
-
 #include <SQLiteCpp/SQLiteCpp.h>
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <unistd.h>
 
+#include "base/env.h"
 #include "gt3x/forms/model.h"
 
 namespace sixpoint::repair {
@@ -38,6 +35,8 @@ int give_up_after(void* looks) { return ++*static_cast<int*>(looks) > kMostLooks
 }  // namespace
 
 Result<FileFacts> read_agd_facts(const std::string& path) {
+  // SQLite would wait for who writes into a FIFO. It reads the real disk, and so does this.
+  SIXPOINT_CHECK(posix_env().files.open(path));
   try {
     const SQLite::Database database(uri_of(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
     sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH, kLongestValue);
@@ -65,15 +64,6 @@ Result<FileFacts> read_agd_facts(const std::string& path) {
     }
     return facts;
   } catch (const SQLite::Exception& exception) {
-    if (exception.getErrorCode() == SQLITE_CANTOPEN) {
-      // SQLite says no more; it reads the real disk, and so does this.
-      const bool may_read = ::faccessat(AT_FDCWD, path.c_str(), R_OK, AT_EACCESS) == 0;
-      if (!may_read && errno == EACCES) {
-        return fail(ErrorCode::permission, "this user may not read the file", path,
-                    "ask its owner, or copy it");
-      }
-      return fail(ErrorCode::no_input, "cannot be opened as an .agd", path, "check the path");
-    }
     return fail(ErrorCode::bad_data, fmt::format("cannot be read as an .agd: {}", exception.what()),
                 path, "export the .agd again from its recording");
   }

@@ -15,7 +15,7 @@
 
 namespace sixpoint::repair {
 
-// Read-only, without making a journal beside the file. no_input where there is no file, permission
+// Read-only, without making a journal beside the file. no_input where there is no regular file, permission
 // where this user may not read it, bad_data where it is no .agd or claims more work or memory than settings need.
 Result<FileFacts> read_agd_facts(const std::string& path);
 

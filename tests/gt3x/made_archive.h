@@ -19,6 +19,7 @@ struct MadeEntry {
   std::uint16_t flags = 0;
   int method = -1;  // what the headers say, where it is not what was done
   std::uint32_t attributes = 0100644U << 16U;
+  bool listed_only = false;  // the list says that it is the entry before
 };
 
 inline Bytes zlib_deflated(const Bytes& bytes) {
@@ -75,7 +76,8 @@ class MadeArchive {
     const auto flags = entry.flags | (entry.described_behind ? 8U : 0U);
     const auto method =
         static_cast<std::uint64_t>(entry.method >= 0 ? entry.method : (entry.deflated ? 8 : 0));
-    const std::size_t offset = bytes.size();
+    const std::size_t before = bytes.size();
+    const std::size_t offset = entry.listed_only ? last_offset_ : before;
     put(bytes, 0x04034b50, 4);
     put(bytes, 20, 2);
     put(bytes, flags, 2);
@@ -95,6 +97,10 @@ class MadeArchive {
       put(bytes, 0x08074b50, 4);
       put_facts(bytes, crc, packed.size(), entry.bytes.size());
     }
+    if (entry.listed_only) {
+      bytes.resize(before);
+    }
+    last_offset_ = offset;
     put(list_, 0x02014b50, 4);
     put(list_, 0x0314, 2);
     put(list_, 20, 2);
@@ -111,6 +117,7 @@ class MadeArchive {
   }
 
   Bytes list_;
+  std::size_t last_offset_ = 0;
 };
 
 }  // namespace sixpoint::gt3x::tests

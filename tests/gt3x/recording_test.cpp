@@ -8,6 +8,7 @@
 #include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "gt3x/made_archive.h"
 #include "gt3x/recording_writer.h"
 #include "gt3x_made_log.h"
 #include "shared_data.h"
@@ -227,6 +228,25 @@ TEST(RecordingWriter, CopiesEntriesUntouched) {
   }
   EXPECT_EQ(log_of(memory.files, "g").value(), made_log(3));
   EXPECT_FAILS(out->copy(*from, "none"), ErrorCode::bad_data);
+}
+
+TEST(RecordingWriter, CopiesANameThatIsNoUtf8) {
+  const std::string info = made_info();
+  const std::string name = "\x99l.txt";
+  const tests::MadeArchive made(
+      {{"log.bin", made_log(1)}, {"info.txt", Bytes(info.begin(), info.end())}, {name, Bytes{1}}});
+  MemoryEnv memory;
+  ASSERT_OK(put(memory.files, "f", made.bytes));
+  auto from = Recording::open(memory.files, "f");
+  ASSERT_OK(from);
+  auto out = RecordingWriter::create(memory.files, "g");
+  for (const EntryInfo& entry : from->entries()) {
+    ASSERT_OK(out->copy(*from, entry.name));
+  }
+  ASSERT_OK(out->commit());
+  const auto copy = Recording::open(memory.files, "g");
+  ASSERT_OK(copy);
+  EXPECT_TRUE(copy->has_entry(name));
 }
 
 TEST(RecordingWriter, UnknownSizesMakeReadableEntries) {

@@ -87,6 +87,13 @@ def small(folder, seconds=(0, 1, 2, 5, 6)):
     return write_recording(pathlib.Path(folder) / "small.gt3x", log)
 
 
+def many_gaps(folder):
+    """Every other second is missing: a gap more than are listed."""
+    payload = packed(samples_of(0))
+    log = b"".join(record(0, START + 2 * second, payload) for second in range(10_002))
+    return write_recording(pathlib.Path(folder) / "gaps.gt3x", log)
+
+
 class InFolder(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())

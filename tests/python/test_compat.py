@@ -5,9 +5,10 @@ import unittest
 import zipfile
 
 import numpy as np
+import sixpoint
 from sixpoint.compat.pygt3x import FileReader
 
-from made import InFolder, real, small
+from made import INFO, InFolder, many_gaps, packed, real, record, samples_of, small, write_recording
 
 START = 1_428_588_240
 
@@ -77,6 +78,19 @@ class Drop(InFolder):
         self.assertEqual(len(frame), 5 * 30)
         self.assertNotIn(START + 3, frame.index)
         self.assertEqual(frame.index[90], START + 5)
+
+    def test_takes_lines_of_info_that_are_blank(self):
+        info = INFO.replace("Rate: 30", "Rate: 30.0") + "Age: \r\nHeight: tall\r\nDownload Date: \r\nStop Date: \r\n"
+        path = write_recording(self.folder / "blank.gt3x", record(0, START, packed(samples_of(0))), info)
+        with FileReader(path) as reader:
+            self.assertEqual((reader.info.age, reader.info.height, reader.info.download_date), (None, None, None))
+            self.assertEqual((reader.info.stop_date, reader.info.start_date), (0, 635_641_850_400_000_000))
+            self.assertEqual(reader.info.sample_rate, 30)
+            self.assertIsInstance(reader.info.sample_rate, int)
+
+    def test_refuses_more_gaps_than_are_listed(self):
+        with self.assertRaisesRegex(sixpoint.BadDataError, "more than 10000 gaps"):
+            FileReader(many_gaps(self.folder)).__enter__()
 
 
 class Real(unittest.TestCase):

@@ -37,6 +37,11 @@ class Small(InFolder):
         self.assertEqual(len(recording), 30)
         self.assertTrue(recording.info["Subject Name"].startswith("Andr"))
 
+    def test_takes_the_first_line_of_a_key(self):
+        log = record(0, START, packed(samples_of(0)))
+        path = write_recording(self.folder / "twice.gt3x", log, INFO + "TimeZone: 01:00:00\r\n")
+        self.assertEqual(sixpoint.read(path).info["TimeZone"], "-04:00:00")
+
     def test_tells_the_time_of_each_sample(self):
         recording = sixpoint.read(small(self.folder))
         self.assertEqual(len(recording), 7 * 30)

@@ -43,6 +43,10 @@ if (file.exists(affected)) {
   message("SKIPPED, NOT PASSED: ", affected, " is not there")
 }
 
+said <- tryCatch(read_gt3x_sixpoint("gaps.gt3x"), warning = conditionMessage)
+stopifnot(identical(said, "missingness has the first 10000 of 10001 gaps"))
+stopifnot(attr(read_gt3x_sixpoint("twice.gt3x"), "time_zone") == "-04:00:00")
+
 broken <- tempfile(fileext = ".gt3x")
 writeBin(raw(100), broken)
 error <- tryCatch(read_gt3x_sixpoint(broken), sixpoint_error = function(e) e)

@@ -30,6 +30,10 @@ for seed in 1 2; do
   sed "s/\"seed\": 1/\"seed\": $seed/" "$source_folder/tests/docs/scenario.json" >"s$seed.json"
   "$SIXPOINT_PROGRAM" simulate --scenario "s$seed.json" -o "day$seed.gt3x" >/dev/null 2>&1
 done
+PYTHONPATH=$source_folder/tests/python python3 -c '
+from made import *
+many_gaps(".")
+write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")'
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
 for call in scan_16cpan03 read_gt3x_sixpoint; do

@@ -193,13 +193,16 @@ def read(
     reading = _open(path, unit, fill, dtype, fill_limit_s, salvage)
     acceleration = reading.read_all()
     inspection = Inspection.from_json(reading.facts())
+    info: dict[str, str] = {}
+    for key, value in reading.info():
+        info.setdefault(_text(key), _text(value))  # of a key that stands twice, the first
     return Recording(
         path=os.fsdecode(path),
         unit=unit,
         fill=fill,
         acceleration=acceleration,
         sample_rate_hz=float(inspection.sample_rate_hz or 0.0),
-        info={_text(key): _text(value) for key, value in reading.info()},
+        info=info,
         inspection=inspection,
         _runs=reading.runs(),
         _rate_hz=reading.rate_hz(),

@@ -118,7 +118,7 @@ class Zip:
         self.places = {}
 
     def add(self, name, data, deflate=False, behind=False, flags=0, method=None, crc=None, size=None, zip64=False,
-            attributes=0o100644 << 16, packed=None, extra=b"", listed=True, signature=True, level=6):
+            attributes=0o100644 << 16, packed=None, extra=b"", listed=True, signature=True, level=6, at=None):
         raw_name = name if isinstance(name, bytes) else name.encode()
         if packed is None:
             packed = data
@@ -129,7 +129,8 @@ class Zip:
         size = len(data) if size is None else size
         flags |= 8 if behind else 0
         method = (8 if deflate else 0) if method is None else method
-        offset = len(self.out)
+        before = self.out
+        offset = len(self.out) if at is None else at
         sizes = struct.pack("<III", crc, len(packed), min(size, 0xFFFFFFFF))
         local_extra = b""
         local = struct.pack("<III", 0, 0, 0) if behind else sizes
@@ -151,6 +152,8 @@ class Zip:
             self.list += sizes + struct.pack("<HHHHHII", len(raw_name), len(extra), 0, 0, 0, attributes, offset)
             self.list += raw_name + extra
             self.count += 1
+        if at is not None:  # in the list alone: what stands at that place
+            self.out = before
         return self
 
     def end(self, zip64=False, comment=b""):
@@ -255,6 +258,10 @@ def archives(suite):
     suite.put("Z8", "an entry that claims 2 GiB of 1 KB", archive(log, size=2**31 - 1), answer="refused")
     suite.put("Z8", "an entry that claims 20 GiB",
               Zip().add("log.bin", log, size=20 * 2**30, zip64=True).add("info.txt", info()).end(), answer="refused")
+    same = Zip().add("log.bin", log).add("info.txt", info())
+    for i in range(9):
+        same.add(f"{i}", log, at=0)
+    suite.put("Z8", "ten entries of the same bytes", same.end(), answer="refused", says="overlap")
     for behind in (1, 4096, 65_536, 70_000):
         suite.put("Z9", f"{behind} zero bytes behind the archive", archive(log) + bytes(behind), **facts)
     suite.put("Z9", "an end record behind the archive whose list is not there",

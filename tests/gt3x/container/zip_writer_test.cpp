@@ -134,5 +134,32 @@ TEST(ZipWriter, ErrorsOfSourceAndSinkComeBack) {
   }
 }
 
+// The sanitizers see a thread that packs a piece which is gone.
+TEST(ZipWriter, ASourceThatBreaksAtAnyPieceLeavesNoThreadBehind) {
+  class BreaksAt final : public ByteSource {
+   public:
+    explicit BreaksAt(Bytes bytes) : bytes_(std::move(bytes)) {}
+    Result<std::size_t> read(std::span<std::uint8_t> out) override {
+      SIXPOINT_ASSIGN(const std::size_t count, bytes_.read(out));
+      if (count == 0) {
+        return fail(ErrorCode::bad_data, "the source broke", "f", "mend it");
+      }
+      return count;
+    }
+
+   private:
+    MemorySource bytes_;
+  };
+  const Bytes all = log_like(9 * kPackedPieceSize);
+  for (const unsigned jobs : {2U, 3U}) {
+    for (std::size_t pieces = 2; pieces <= 2 * jobs + 3; ++pieces) {
+      ZipWriter zip([](std::span<const std::uint8_t>) { return Status{}; }, jobs);
+      const auto part = std::span(all).first(pieces * kPackedPieceSize);
+      BreaksAt source({part.begin(), part.end()});
+      EXPECT_FAILS(zip.add("log.bin", source, Packing::deflate), ErrorCode::bad_data);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::gt3x

@@ -4,6 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x_made_log.h"
+
 namespace sixpoint::repair {
 namespace {
 
@@ -45,6 +49,22 @@ TEST(Trace, ASecondHasItsExtremesAndItsDeviation) {
   }
   trace = Trace::from_magnitudes("a", 1000, 20, values);
   EXPECT_TRUE(std::isnan(second_at(trace, 1001).sd_g)) << "more than half are missing";
+}
+
+// A clock that leaps ahead by hours and back again.
+TEST(Trace, NoSampleIsLostWhereTheClockLeapsBack) {
+  Bytes log;
+  for (const std::uint32_t second : {0U, 1U, 20'000U, 20'001U, 2U, 3U}) {
+    gt3x::tests::append_second(log, second);
+  }
+  MemoryEnv memory;
+  ASSERT_OK(gt3x::tests::put_recording(memory.files, "f", log));
+  const auto trace = Trace::load(memory.files, "f");
+  ASSERT_OK(trace);
+  ASSERT_EQ(trace->size(), 20'002U * 30);
+  for (const std::size_t second : {0U, 3U, 20'000U, 20'001U}) {
+    EXPECT_FALSE(std::isnan(trace->magnitude_g(30 * second))) << second;
+  }
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "base/sha256.h"
 #include "expect_result.h"
 #include "gt3x/made_archive.h"
+#include "repair/old_form.h"
 #include "repair/rescale/repair_mark.h"
 #include "repair/six_sides.h"
 #include "shared_data.h"
@@ -957,6 +958,21 @@ TEST_F(RepairFile, SalvageWritesAFileThatNeedsNoRepairAndDoesNotCallItRepaired) 
   const RepairReport again = repair(options);
   EXPECT_TRUE(again.resumed);
   EXPECT_EQ(again.status, RepairStatus::not_affected);
+}
+
+TEST_F(RepairFile, SalvageOfADamagedFileOfTheOldFormIsNotAffected) {
+  tests::OldRecording made;
+  made.raw = six_sides().raw;
+  ASSERT_OK(made.write(memory_.files, "whole.gt3x"));
+  Bytes bytes = read_file(memory_.files, "whole.gt3x").value();
+  bytes[bytes.size() - 22 + 16] ^= 0xFFU;  // where the list of entries begins
+  ASSERT_OK(write_file(memory_.files, "in.gt3x", as_text(bytes)));
+  RepairOptions options;
+  options.salvage = true;
+  const RepairReport report = repair(options);
+  EXPECT_EQ(report.status, RepairStatus::not_affected) << report.to_json().dump(1);
+  EXPECT_FALSE(report.losses.empty());
+  EXPECT_FALSE(exists("out.gt3x"));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "expect_result.h"
 #include "repair/made_agd.h"
@@ -36,6 +37,8 @@ TEST(Agd, APathMayBeginWithTwoSlashes) {
 TEST(Agd, RefusesOtherFiles) {
   const tests::TemporaryFolder folder;
   EXPECT_FAILS(read_agd_facts(folder / "none.agd"), ErrorCode::no_input);
+  ASSERT_EQ(::mkfifo((folder / "fifo.agd").c_str(), 0600), 0);
+  EXPECT_FAILS(read_agd_facts(folder / "fifo.agd"), ErrorCode::no_input);  // and does not wait
   std::ofstream(folder / "text.agd") << "this is no database, and it is long enough to say so";
   EXPECT_FAILS(read_agd_facts(folder / "text.agd"), ErrorCode::bad_data);
   make_database(folder / "empty.agd", kSettingsTable);

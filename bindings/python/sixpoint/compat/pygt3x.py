@@ -18,6 +18,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
+from .._errors import BadDataError
 from .._recording import Recording, read
 
 if TYPE_CHECKING:
@@ -25,9 +26,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-
+# A line that is missing, blank or no number is None.
 def _number(text: Optional[str]) -> Optional[float]:
-    return None if text is None else float(text.replace(",", "."))
+    try:
+        return float((text or "").replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _ticks(text: Optional[str]) -> Optional[int]:
+    try:
+        return int(text or "")
+    except ValueError:
+        return None
 
 
 @dataclass
@@ -72,19 +83,19 @@ class Info:
             board_revision=get("Board Revision"),
             device_type=get("Device Type"),
             dominance=get("Dominance"),
-            download_date=int(lines["Download Date"]) if "Download Date" in lines else None,
+            download_date=_ticks(get("Download Date")),
             firmware=get("Firmware"),
             height=_number(get("Height")),
-            last_sample_time=int(get("Last Sample Time", "0")),
+            last_sample_time=_ticks(get("Last Sample Time")) or 0,
             limb=get("Limb"),
             mass=get("Mass"),
             race=get("Race"),
-            sample_rate=int(get("Sample Rate", "0")),
+            sample_rate=round(_number(get("Sample Rate")) or 0),
             serial_number=get("Serial Number"),
             sex=get("Sex"),
             side=get("Side"),
-            start_date=int(get("Start Date", "0")),
-            stop_date=int(get("Stop Date", "0")),
+            start_date=_ticks(get("Start Date")) or 0,
+            stop_date=_ticks(get("Stop Date")) or 0,
             subject_name=get("Subject Name"),
             timezone=get("TimeZone"),
             unexpected_resets=get("Unexpected Resets", 0),
@@ -130,6 +141,15 @@ class FileReader:
 
     def __enter__(self) -> FileReader:
         recording = read(self.file_name, unit="g", dtype="float32")
+        listed = len(recording.gaps)
+        if recording.inspection.gap_count > listed:
+            # Which rows behind them are no samples is not known.
+            raise BadDataError(
+                "bad_data",
+                f"the recording has more than {listed} gaps",
+                recording.path,
+                "use sixpoint.read() with fill='none'",
+            )
         self._recording = recording
         self.info = Info.of(recording.info)
         self.nhanes = recording.inspection.form == "gt3x_old"

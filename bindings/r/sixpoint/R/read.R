@@ -57,6 +57,9 @@ attributes_of <- function(said, imputed) {
   header[["Serial Prefix"]] <- substr(serial, 1, 3)
   rate <- facts$sample_rate_hz
   gaps <- said$gaps
+  if (facts$gap_count > NROW(gaps)) {
+    warning("missingness has the first ", NROW(gaps), " of ", facts$gap_count, " gaps", call. = FALSE)
+  }
   missing <- if (length(gaps) == 0) {
     data.frame(time = as.POSIXct(numeric(0), origin = "1970-01-01", tz = "GMT"), n_missing = integer(0))
   } else {
