@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "base/utf8.h"
+#include "base/text/utf8.h"
 #include "db/chain.h"
 #include "db/name_rule.h"
 

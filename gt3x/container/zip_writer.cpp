@@ -6,7 +6,7 @@
 
 #include <isa-l/crc.h>
 
-#include "base/utf8.h"
+#include "base/text/utf8.h"
 #include "gt3x/container/pack_line.h"
 #include "gt3x/container/zip_format.h"
 
