@@ -19,7 +19,9 @@ namespace sixpoint {
 namespace {
 
 // One errno, three kinds of answer: what was asked for decides between "no such input" and "cannot
-// create"; permission and a full disk are the same for both.
+// create"; permission and a full disk are the same for both. There is "no such input" only where the
+// name leads to nothing: a disk that fails, or no free descriptor, does not mean that a file is not
+// there.
 tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::string& doing,
                                      const std::string& path) {
   const std::string what = fmt::format("{}: {}", doing, std::strerror(error));
@@ -37,11 +39,14 @@ tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::
                   "raise the limit of a file's size ('ulimit -f'), or choose a disk that takes "
                   "larger files, and run the command again");
     case ENOENT:
+    case ENOTDIR:
+    case ENAMETOOLONG:
       return fail(otherwise, what, path, "check the path");
     case EEXIST:
       return fail(otherwise, what, path, "choose another name");
     default:
-      return fail(otherwise, what, path, "check the path and the disk");
+      return fail(otherwise == ErrorCode::no_input ? ErrorCode::io : otherwise, what, path,
+                  "check the path and the disk");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <pwd.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/atomic_file.h"
@@ -118,36 +119,41 @@ std::vector<std::string> with_store(std::vector<std::string> words, const std::s
 
 namespace {
 
-db::SavePlaces save_places(const std::string& location) {
+// The temporary folder is everybody's, and the name can be foreseen: another user may have made it.
+bool is_nobody_elses(const std::string& folder) {
+  struct stat there {};
+  return ::lstat(folder.c_str(), &there) != 0 ||
+         (S_ISDIR(there.st_mode) && there.st_uid == ::geteuid());
+}
+
+db::SavePlaces save_places(const std::string& location, LastResort last_resort) {
   db::SavePlaces places;
   places.journal = journal_folder(location);
+  if (last_resort == LastResort::none) {
+    return places;
+  }
   const std::string name = "/sixpoint-journal-" + store_name(location);
   places.last_resorts.push_back("." + name);
   std::error_code error;
   if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
     places.last_resorts.push_back(folder.string() + name);
   }
+  std::erase_if(places.last_resorts,
+                [](const std::string& folder) { return !is_nobody_elses(folder); });
   return places;
 }
 
 }  // namespace
 
 Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id) {
-  db::SavePlaces places = save_places(location);
-  places.last_resorts.push_back(places.journal);
-  for (const std::string& folder : places.last_resorts) {
-    SIXPOINT_ASSIGN(const bool is_there, db::Journal::holds(files, folder, id));
-    if (is_there) {
-      return true;
-    }
-  }
-  return false;
+  return db::Journal::holds(files, journal_folder(location), id);
 }
 
 Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
-                               const std::function<Status(db::RecordWriter&)>& work) {
-  const db::SavePlaces places = save_places(location);
+                               const std::function<Status(db::RecordWriter&)>& work,
+                               LastResort last_resort) {
+  const db::SavePlaces places = save_places(location, last_resort);
   auto kept = db::save(context.env.files, store, places, work);
   if (!kept || kept->in_store()) {
     if (kept && kept->caught_up > 0) {
@@ -197,13 +203,13 @@ namespace {
 
 Result<SavedConstants> save_in_store(Context& context, const std::string& location,
                                      Result<db::Store>& store, const calib::ConstantsRecord& record,
-                                     const std::string& model) {
+                                     const std::string& model, LastResort last_resort) {
   SavedConstants done;
-  SIXPOINT_ASSIGN(
-      done.place, keep_records(context, location, store, [&](db::RecordWriter& writer) -> Status {
-        SIXPOINT_ASSIGN(done.id, writer.add_constants(station::constants_row(record), model));
-        return {};
-      }));
+  const auto work = [&](db::RecordWriter& writer) -> Status {
+    SIXPOINT_ASSIGN(done.id, writer.add_constants(station::constants_row(record), model));
+    return {};
+  };
+  SIXPOINT_ASSIGN(done.place, keep_records(context, location, store, work, last_resort));
   if (done.place.in_store()) {
     SIXPOINT_ASSIGN(const auto history, store->constants_history(record.serial));
     const auto applying = repair::applying_constants(history, record.filter);
@@ -219,8 +225,9 @@ Result<SavedConstants> save_in_store(Context& context, const std::string& locati
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,
                                       const std::string& location, Result<db::Store>& store,
                                       const calib::ConstantsRecord& record,
-                                      const std::string& model, const std::string& path) {
-  auto saved = save_in_store(context, location, store, record, model);
+                                      const std::string& model, const std::string& path,
+                                      LastResort last_resort) {
+  auto saved = save_in_store(context, location, store, record, model, last_resort);
   Status written = write_constants(files, path, record);
   if (!saved) {
     if (!written) {
@@ -236,14 +243,14 @@ Result<SavedConstants> save_constants(Context& context, FileSystem& files,
 
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     Result<db::Store>& store, const station::CaptureReport& report,
-                                    const std::string& path) {
+                                    const std::string& path, LastResort last_resort) {
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
   origin.file = db::storable_path(file_name_of(report.file));
   origin.kind = "calibration_file";
   SIXPOINT_ASSIGN(const auto record, calib::record_of(*report.solved, env.clock.now(), origin));
   return save_constants(context, env.files, location, store, record,
-                        std::string(gt3x::model_of(record.serial)), path);
+                        std::string(gt3x::model_of(record.serial)), path, last_resort);
 }
 
 CLI::Option* add_store_option(CLI::App& command, std::string& location) {

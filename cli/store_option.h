@@ -10,6 +10,7 @@
 // without $HOME that of the user's entry in passwd).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -73,6 +74,12 @@ std::string catch_up_line(const std::string& location);
 // For next_step(): the command's words, with --store where `location` was named.
 std::vector<std::string> with_store(std::vector<std::string> words, const std::string& location);
 
+// Where records go when not even the journal takes them. A command has nothing but its last resorts,
+// ./sixpoint-journal-... and the same in the temporary folder; one that is another user's, or a link,
+// is none. The station takes none: its temporary folder ends with it, and it keeps the run in its
+// state folder and tries again.
+enum class LastResort : std::uint8_t { folders, none };
+
 // Calls `work` with the store, or with the journal where the store fails (db/save.h). `store` is
 // the result of open_store().
 //
@@ -83,8 +90,9 @@ std::vector<std::string> with_store(std::vector<std::string> words, const std::s
 //   journal of last resort    warning           74
 Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
-                               const std::function<Status(db::RecordWriter&)>& work);
-// Whether keep_records() put the record of this id beside the store, and no store has it yet.
+                               const std::function<Status(db::RecordWriter&)>& work,
+                               LastResort last_resort = LastResort::folders);
+// Whether the record of this id is in the journal, so that no store has it yet.
 Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id);
 // "stored as 3cb89c474fa2"; "kept in the journal as ..." where the store took nothing.
 std::string kept_as(const db::Saved& kept, const std::string& id);
@@ -105,10 +113,12 @@ struct SavedConstants {
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,
                                       const std::string& location, Result<db::Store>& store,
                                       const calib::ConstantsRecord& record,
-                                      const std::string& model, const std::string& path);
+                                      const std::string& model, const std::string& path,
+                                      LastResort last_resort = LastResort::folders);
 // The same with those of a calibration file that was made just now, and the files of `env`.
 Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     Result<db::Store>& store, const station::CaptureReport& report,
-                                    const std::string& path);
+                                    const std::string& path,
+                                    LastResort last_resort = LastResort::folders);
 
 }  // namespace sixpoint::cli

@@ -152,8 +152,10 @@ Result<bool> Journal::holds(FileSystem& files, const std::string& folder, const 
 Result<std::string> Journal::add(NewRows rows) {
   SIXPOINT_ASSIGN(const auto names, entries());
   std::uint64_t last = 0;
-  if (!names.empty()) {
-    std::from_chars(names.back().data(), names.back().data() + names.back().size(), last);
+  for (const std::string& name : names) {  // a person may have renamed one: it may sort last
+    std::uint64_t number = 0;
+    std::from_chars(name.data(), name.data() + name.size(), number);
+    last = std::max(last, number);
   }
   const std::string record = to_json(rows).dump();
   const Json line = {{"schema", kEntryFormat}, {"sha256", text_sha256(record)}, {"record", record}};
@@ -193,7 +195,7 @@ Result<std::size_t> Journal::catch_up(Store& store) {
   for (const std::string& name : names) {
     const std::string path = folder_ + "/" + name;
     const auto bytes = read_file(*files_, path, kLargestEntry);
-    if (!bytes && bytes.error().code == ErrorCode::no_input) {
+    if (!bytes && bytes.error().code == ErrorCode::no_input && !files_->info(path)) {
       continue;  // another program gave it to the store meanwhile
     }
     SIXPOINT_CHECK(bytes);

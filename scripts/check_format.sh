@@ -2,7 +2,9 @@
 # Fails and names the files that clang-format would change. `scripts/check_format.sh --fix` changes them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-mapfile -t files < <(git ls-files '*.cpp' '*.h')
+list=$(git ls-files '*.cpp' '*.h')  # not in <(...), whose failure would pass unseen
+[ -n "$list" ] || { echo "git knows no file to check" >&2; exit 1; }
+mapfile -t files <<<"$list"
 if [ "${1:-}" = --fix ]; then
   clang-format -i "${files[@]}"
   exit 0

@@ -112,7 +112,7 @@ class StationStore {
     const std::lock_guard lock(mutex_);
     auto store = opened();
     SIXPOINT_ASSIGN(auto saved, save_capture(context_, context_.env, options_.store, store, report,
-                                             report.file + ".constants.json"));
+                                             report.file + ".constants.json", LastResort::none));
     return station::KeptConstants{std::move(saved.id), std::move(saved.file_problem)};
   }
   Result<station::RunDocument> document(const std::string& run_id, const std::string& kind);
@@ -180,12 +180,12 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
   station::complete_run_record(run, report, {}, labels.is_authenticated);
   station::RunInStore stored;
   auto store = opened();
-  SIXPOINT_ASSIGN(
-      const db::Saved saved,
-      keep_records(context_, options_.store, store, [&](db::RecordWriter& writer) -> Status {
-        SIXPOINT_ASSIGN(stored.ids, station::add_run_records(writer, report, run));
-        return {};
-      }));
+  const auto work = [&](db::RecordWriter& writer) -> Status {
+    SIXPOINT_ASSIGN(stored.ids, station::add_run_records(writer, report, run));
+    return {};
+  };
+  SIXPOINT_ASSIGN(const db::Saved saved,
+                  keep_records(context_, options_.store, store, work, LastResort::none));
   stored.is_kept_here = !saved.in_store();
   run.id = stored.ids.run_id;
   if (saved.in_store()) {

@@ -53,15 +53,13 @@ Result<OperatorRole> parse_operator_role(std::string_view text) {
 
 Result<std::vector<Operators::Entry>> Operators::read() const {
   std::vector<Entry> entries;
-  const auto bytes = read_file(env_.files, path_, kMostFileBytes);
-  if (!bytes && bytes.error().code == ErrorCode::no_input) {
+  if (const auto there = env_.files.info(path_);
+      !there && there.error().code == ErrorCode::no_input) {
     return entries;
   }
-  if (!bytes) {
-    return fail(bytes.error());
-  }
+  SIXPOINT_ASSIGN(const Bytes bytes, read_file(env_.files, path_, kMostFileBytes));
   try {
-    const Json json = Json::parse(bytes->begin(), bytes->end());
+    const Json json = Json::parse(bytes.begin(), bytes.end());
     for (const Json& item : json.at("operators")) {
       SIXPOINT_ASSIGN(const OperatorRole role,
                       parse_operator_role(item.at("role").get<std::string>()));

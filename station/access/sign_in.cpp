@@ -38,17 +38,14 @@ std::string seal_of(const std::string& token, std::string_view session) {
 }  // namespace
 
 Result<std::string> read_or_make_token(FileSystem& files, const std::string& path) {
-  const auto bytes = read_file(files, path, 4096);
-  if (!bytes && bytes.error().code == ErrorCode::no_input) {
+  if (const auto there = files.info(path); !there && there.error().code == ErrorCode::no_input) {
     const std::string token = random_hex(16);
     SIXPOINT_CHECK(make_private_folders(files, folder_of(path)));
     SIXPOINT_CHECK(write_private_file(files, path, token + "\n"));
     return token;
   }
-  if (!bytes) {
-    return fail(bytes.error());
-  }
-  std::string token(bytes->begin(), bytes->end());
+  SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, 4096));
+  std::string token(bytes.begin(), bytes.end());
   token.resize(std::min(token.find_first_of("\r\n"), token.size()));
   const bool is_plain = std::all_of(token.begin(), token.end(), [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||

@@ -363,6 +363,12 @@ ApiAnswer Api::post(const ApiRequest& request) {
     const auto lane = parts_.lanes.scan(0, *serial, client_of(request));
     return lane ? answer(200, {{"lane", *lane}}) : lane_refusal(lane.error());
   }
+  if (parts == std::vector<std::string>{"repair"} ||
+      (parts == std::vector<std::string>{"check"} && body.value("save", Json(false)) == true)) {
+    if (const auto who = signer(request, {}, OperatorRole::technician); !who) {
+      return who.error();
+    }
+  }
   if (parts.size() == 1 && parts[0] == "check") {
     return check_file(body);
   }

@@ -3,10 +3,12 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 #include <nlohmann/json.hpp>
 
+#include "base/thrown.h"
 #include "repair/archive/output_lock.h"
 #include "repair/batch/manifest.h"
 #include "repair/batch/repair_files.h"
@@ -214,15 +216,22 @@ Status RepairJob::start(const RepairOrder& order) {
     impl_->thread.join();  // it has ended: its state says so
   }
   impl_->begin(job.files.size());
-  const std::lock_guard lock(impl_->mutex);
-  impl_->thread = std::jthread([this, job = std::move(job)](const std::stop_token& stop) mutable {
+  auto work = [this, job = std::move(job)](const std::stop_token& stop) mutable {
     // As Lane::work(): an exception is a defect, and ends this job alone.
     try {
       impl_->work(stop, std::move(job));
     } catch (const std::exception& defect) {
       impl_->end("failed", "a defect of the program ended the repair: " + printable(defect.what()));
     }
-  });
+  };
+  try {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->thread = std::jthread(std::move(work));
+  } catch (const std::system_error& no_thread) {
+    Error error = error_of(no_thread);
+    impl_->end("failed", error.brief());
+    return fail(std::move(error));
+  }
   return {};
 }
 

@@ -356,9 +356,13 @@ class Server::Impl::Connection : public Idle,
     if (!plain().socket().is_open()) {
       return;
     }
-    const std::string text = events_->next();
-    text.empty() ? wait_for_events()
-                 : write_events(fmt::format("{:x}\r\n{}\r\n", text.size(), text));
+    try {
+      const std::string text = events_->next();
+      text.empty() ? wait_for_events()
+                   : write_events(fmt::format("{:x}\r\n{}\r\n", text.size(), text));
+    } catch (const std::exception&) {  // as in handle(); the page opens another stream
+      plain().close();
+    }
   }
 
   Impl& server_;
@@ -440,10 +444,11 @@ void Server::Impl::accept_locally() {
       asio::make_strand(io), [this](const NetworkError& error, stream_protocol::socket socket) {
         if (error) {
           env.clock.sleep(std::chrono::milliseconds(1));  // no descriptor is free
-        } else if (is_own_user(socket)) {
+        }
+        accept_locally();  // before what may throw
+        if (!error && is_own_user(socket)) {
           begin<LocalStream>(std::move(socket));
         }
-        accept_locally();
       });
 }
 
@@ -452,10 +457,11 @@ void Server::Impl::accept() {
       asio::make_strand(io), [this](const NetworkError& error, tcp::socket socket) {
         if (error) {
           env.clock.sleep(std::chrono::milliseconds(1));  // no descriptor is free
-        } else {
+        }
+        accept();  // before what may throw
+        if (!error) {
           tls ? begin<TlsStream>(std::move(socket), *tls) : begin<PlainStream>(std::move(socket));
         }
-        accept();
       });
 }
 
@@ -549,7 +555,16 @@ void Server::serve() {
   }
   std::vector<std::jthread> threads;
   for (std::size_t i = 0; i < impl_->options.threads; ++i) {
-    threads.emplace_back([this] { impl_->io.run(); });
+    threads.emplace_back([this] {
+      for (;;) {
+        try {
+          impl_->io.run();
+          return;
+        } catch (const std::exception&) {
+          // Its connection ends with the handler that threw; the lanes and the others go on.
+        }
+      }
+    });
   }
 }
 

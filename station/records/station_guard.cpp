@@ -91,7 +91,8 @@ StationMemory parse_memory(const Json& json) {
 
 Result<StationMemory> StationGuard::memory() const {
   const std::string path = folder_ + kName;
-  if (!env_.files.info(path)) {
+  if (const auto there = env_.files.info(path);
+      !there && there.error().code == ErrorCode::no_input) {
     return StationMemory{};
   }
   const auto damaged = [&path] {
@@ -101,7 +102,8 @@ Result<StationMemory> StationGuard::memory() const {
   };
   const auto bytes = read_file(env_.files, path, kMostMemory_bytes);
   if (!bytes) {
-    return damaged();
+    // A disk that fails says nothing about the file: it stays.
+    return bytes.error().code == ErrorCode::bad_data ? damaged() : fail(bytes.error());
   }
   try {
     return parse_memory(Json::parse(*bytes, nullptr, false));

@@ -9,6 +9,7 @@
 #include "base/env.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "open_files_limit.h"
 #include "temporary_folder.h"
 #include "text_of.h"
 
@@ -29,6 +30,24 @@ TEST(PosixFiles, WritesReadsListsAndRefuses) {
   EXPECT_FAILS(files.create(folder + "/x/y/f"), ErrorCode::cannot_create);
   EXPECT_FAILS(read_file(files, folder + "/x/y/f", 4), ErrorCode::bad_data);
   std::filesystem::remove_all(folder);
+}
+
+// What cannot be looked at now may well be there.
+TEST(PosixFiles, OnlyANameThatLeadsToNothingIsNoInput) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  ASSERT_OK(write_file(files, folder / "f", "12345"));
+  for (const std::string& nothing :
+       {folder / "none", folder / "f/below", folder / std::string(300, 'x')}) {
+    EXPECT_FAILS(files.open(nothing), ErrorCode::no_input);
+    EXPECT_FAILS(files.info(nothing), ErrorCode::no_input);
+  }
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_FAILS(files.open(folder / "loop"), ErrorCode::io);
+  EXPECT_FAILS(files.info(folder / "loop"), ErrorCode::io);
+  const tests::OpenFilesLimit limit(0);
+  EXPECT_FAILS(files.open(folder / "f"), ErrorCode::io);
+  EXPECT_FAILS(files.list(folder.path()), ErrorCode::io);
 }
 
 // Whoever has the lock of a name has that of the file that bears it, also where another one, which

@@ -258,6 +258,39 @@ TEST_F(RefusingStore, WithoutAJournalsFolderTheWorkingFolderTakesIt) {
   std::filesystem::current_path(before);
 }
 
+// The name can be foreseen, and anybody may make it in the temporary folder.
+TEST_F(RefusingStore, ALastResortThatIsAnotherUsersOrALinkIsNotTaken) {
+  std::ofstream(path("data")) << "in the way of the folder data/";
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  for (const char* folder : {"tmp", "elsewhere"}) {
+    std::filesystem::create_directory(folder);
+  }
+  ::setenv("TMPDIR", path("tmp").c_str(), 1);
+  const std::string name = "sixpoint-journal-" + file_name_of(cli::journal_folder("none/store.db"));
+  const auto expect_refused = [&] {
+    const auto answer = jig("none/store.db");
+    EXPECT_EQ(answer.exit_code, 74);
+    EXPECT_THAT(answer.people, HasSubstr("could not be kept anywhere"));
+  };
+  for (const std::string& place : {name, "tmp/" + name}) {
+    std::filesystem::create_directory_symlink(path("elsewhere"), place);
+  }
+  expect_refused();
+  EXPECT_TRUE(std::filesystem::is_empty("elsewhere"));
+  if (::geteuid() == 0) {
+    for (const std::string& place : {name, "tmp/" + name}) {
+      std::filesystem::remove(place);
+      std::filesystem::create_directory(place);
+      ASSERT_EQ(::chown(place.c_str(), 65534, 65534), 0);
+    }
+    expect_refused();
+    EXPECT_TRUE(std::filesystem::is_empty(name));
+  }
+  ::unsetenv("TMPDIR");
+  std::filesystem::current_path(before);
+}
+
 // The store's file and folder may be read and not written: it answers, and the run is journalled.
 // Root may write everywhere, so a child is an ordinary user.
 TEST_F(RefusingStore, AReadOnlyPlaceLosesNoRun) {

@@ -10,6 +10,7 @@
 #include "expect_result.h"
 #include "failing_files.h"
 #include "place.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::db {
 namespace {
@@ -411,6 +412,33 @@ TEST_F(JournalTest, AnEntryThatAnotherProgramGaveToTheStoreIsNoError) {
   ASSERT_EQ(runs.size(), 1U);
   EXPECT_EQ(runs[0].started, from_unix_seconds(2));
   EXPECT_EQ(open_journal().pending().value(), 0U);
+}
+
+// No entry is passed over but one that is gone: those behind it would come before it.
+TEST_F(JournalTest, AnEntryThatIsThereAndCannotBeOpenedStopsTheCatchingUp) {
+  const sixpoint::tests::TemporaryFolder folder;
+  auto journal = Journal::open(posix_env().files, folder.path()).value();
+  ASSERT_OK(posix_env().files.make_folders(folder / "0000000001-ab.json"));
+  ASSERT_OK(journal.add_run(run(1), {}));
+  Store store = open_store("main");
+  const auto refused = journal.catch_up(store);
+  EXPECT_FAILS(refused, ErrorCode::no_input);
+  EXPECT_EQ(refused.error().where, folder / "0000000001-ab.json");
+  EXPECT_EQ(store.audit()->rows, 0);
+}
+
+// Numbers go on behind the highest one, whatever else sorts behind it.
+TEST_F(JournalTest, AFileOfAnotherNameDoesNotChangeTheOrder) {
+  Journal journal = open_journal();
+  ASSERT_OK(journal.add_run(run(1), {}));
+  ASSERT_OK(memory_.files.rename("journal/" + memory_.files.list("journal")->front(),
+                                 "journal/bad-0000000001-ab.json"));
+  ASSERT_OK(write_file(memory_.files, "journal/0000000041-cd.json", ""));
+  for (int number = 2; number < 8; ++number) {
+    ASSERT_OK(journal.add_run(run(number), {}));
+    EXPECT_THAT(*memory_.files.list("journal"),
+                testing::Contains(testing::StartsWith("00000000" + std::to_string(number + 40))));
+  }
 }
 
 }  // namespace

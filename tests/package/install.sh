@@ -93,22 +93,27 @@ serve() {
   kill -TERM "$station"
   wait "$station" || failed "the service ended with $?"
 }
+# All that a station has recorded.
+recorded() { (cd "$root/var/lib/sixpoint" && find . -type f -exec sha256sum {} + | sort); }
 serve
 [ "$(stat -c %u "$root/var/lib/sixpoint/store.db" 2>/dev/null)" = 64000 ] || failed "the service made no store of its own"
 
 # The new version: what the user changed stays, and so do the stores.
+recorded >"$scratch/recorded"
 sed -i 's/seed=7/seed=8/' "$root/etc/default/sixpoint-station"
 install $(find "$root/srv/new" -name '*.deb' -printf '/srv/new/%f\n') || exit 1
 [ "$(as_person --version)" = "sixpoint $version" ] || failed "the new version does not run"
 grep -q seed=8 "$root/etc/default/sixpoint-station" || failed "the upgrade took the user's configuration away"
 [ "$(repairs)" = 1 ] || failed "the upgrade lost the person's store"
-store=$(sha256sum <"$root/var/lib/sixpoint/store.db")
+recorded | diff "$scratch/recorded" - || failed "the upgrade changed the station's records"
 serve
+recorded >"$scratch/recorded"
 
 # Removed: nothing is left but what people and stations recorded.
 log=$("${inside[@]}" dpkg --purge libsixpoint-mocks-dev libsixpoint-dev sixpoint-station sixpoint 2>&1) || failed "purge: $log"
 files | comm -13 "$scratch/before" - | grep -v '^./var/lib/sixpoint/' >"$scratch/left" || true
 [ ! -s "$scratch/left" ] || failed "left behind: $(cat "$scratch/left")"
-[ -f "$root/var/lib/sixpoint/store.db" ] && [ -n "$store" ] || failed "the station's records went with the package"
+[ -f "$root/var/lib/sixpoint/store.db" ] && recorded | diff "$scratch/recorded" - ||
+  failed "the station's records went with the package"
 [ "$failures" -eq 0 ] && echo "$version installed, used, upgraded over 0.0.1, and removed"
 exit "$failures"

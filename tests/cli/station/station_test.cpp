@@ -420,5 +420,32 @@ TEST_F(StationCommand, ARunInTheJournalDoesNotChangeHowItEnds) {
   ::unsetenv("XDG_DATA_HOME");
 }
 
+// Not into a last resort in the temporary folder, which ends with the service.
+TEST_F(StationCommand, ARunThatNeitherStoreNorJournalTakesWaitsInTheStateFolder) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  std::ofstream(path("s.db")) << std::string(2000, 'x');  // no store
+  std::filesystem::create_directories(path("data/sixpoint"));
+  std::ofstream(path("data/sixpoint/journal")) << "in the way of the journal";
+  Child station(arguments({"--port", "0", "--device", "virtual:seed=7,jig=auto"}));
+  const int port = port_of(station.line());
+  wait_until_idle(port);
+  nlohmann::json result = measured(port);
+  const auto wait_for = [&](const char* key) {
+    for (int i = 0; i < 600 && !result.contains(key); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      result = lane(port)["result"];
+    }
+  };
+  wait_for("problem");
+  EXPECT_THAT(result.value("problem", ""), HasSubstr("not stored yet")) << result;
+  EXPECT_FALSE(result.value("kept_here", false)) << result;
+  std::filesystem::remove(path("data/sixpoint/journal"));
+  wait_for("run");
+  EXPECT_TRUE(result.value("kept_here", false)) << result;
+  EXPECT_FALSE(std::filesystem::is_empty(path("data/sixpoint/journal")));
+  EXPECT_EQ(station.stop(SIGTERM), 0);
+  ::unsetenv("XDG_DATA_HOME");
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

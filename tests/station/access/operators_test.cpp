@@ -6,7 +6,9 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "open_files_limit.h"
 #include "station/access/secrets.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::station {
 namespace {
@@ -43,6 +45,22 @@ TEST_F(OperatorsTest, WithSomeNobodyWorksUnderATypedName) {
   add_both();
   EXPECT_FAILS(operators_.who("a", "Ada", OperatorRole::technician), ErrorCode::permission);
   EXPECT_FAILS(operators_.who("a", "Eve", OperatorRole::engineer), ErrorCode::permission);
+}
+
+// A list that cannot be read now is not a list of nobody.
+TEST(OperatorsOnADisk, AreNotForgottenWhereTheirFileCannotBeOpened) {
+  const sixpoint::tests::TemporaryFolder folder;
+  Operators operators(posix_env(), folder / "operators.json");
+  ASSERT_OK(operators.add("Ada", OperatorRole::technician, "471100"));
+  {
+    const sixpoint::tests::OpenFilesLimit limit(0);
+    EXPECT_FAILS(operators.who("a", "Mallory", OperatorRole::technician), ErrorCode::io);
+    EXPECT_FAILS(operators.list(), ErrorCode::io);
+  }
+  EXPECT_EQ(operators.list()->size(), 1U);
+  ASSERT_OK(posix_env().files.remove(folder / "operators.json"));
+  ASSERT_OK(posix_env().files.make_folders(folder / "operators.json"));
+  EXPECT_FAILS(operators.who("a", "Mallory", OperatorRole::technician), ErrorCode::no_input);
 }
 
 TEST_F(OperatorsTest, ATechnicianMeasuresAndDoesNotSign) {

@@ -6,6 +6,8 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "open_files_limit.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::station {
 namespace {
@@ -132,6 +134,18 @@ TEST(TokenFile, IsMadeOnceAndReadAgain) {
   ASSERT_OK(made);
   EXPECT_EQ(made->size(), 32U);
   EXPECT_EQ(*read_or_make_token(env.files, "state/token"), *made);
+}
+
+TEST(TokenFile, IsNotReplacedWhereItCannotBeOpened) {
+  const sixpoint::tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  const auto made = read_or_make_token(files, folder / "token");
+  ASSERT_OK(made);
+  {
+    const sixpoint::tests::OpenFilesLimit limit(0);
+    EXPECT_FAILS(read_or_make_token(files, folder / "token"), ErrorCode::io);
+  }
+  EXPECT_EQ(*read_or_make_token(files, folder / "token"), *made);
 }
 
 TEST(TokenFile, WhatIsNoTokenIsRefused) {

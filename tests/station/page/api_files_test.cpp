@@ -21,6 +21,22 @@ TEST(ApiFiles, ListsRecordingsAndFoldersBelowTheStationsFolder) {
   EXPECT_EQ(listed["cut"], false);
 }
 
+// Stored constants take part in later repairs: nobody stores or repairs without a PIN.
+TEST(ApiFiles, WhereThereAreOperatorsOneIsSignedInToStoreAndToRepair) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  EXPECT_OK(Operators(posix_env(), folder / "operators.json")
+                .add("Ada", OperatorRole::technician, "471100"));
+  const Json save = {{"file", "none.gt3x"}, {"save", true}};
+  const Json repair = {{"folder", "none"}, {"output", "out"}};
+  EXPECT_EQ(station.post("/api/check", {{"file", "none.gt3x"}}), 404) << "a look needs none";
+  EXPECT_EQ(station.post("/api/check", save), 403);
+  EXPECT_EQ(station.post("/api/repair", repair), 403);
+  EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", "471100"}}), 200);
+  EXPECT_EQ(station.post("/api/check", save), 404);
+  EXPECT_EQ(station.post("/api/repair", repair), 404);
+}
+
 // The escapes are decoded before the path is checked.
 TEST(ApiFiles, PathsThatLeadOutOfTheFolderAreRefused) {
   const tests::TemporaryFolder folder;

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <pthread.h>
 
 #include "base/atomic_file.h"
 #include "base/forwarding_files.h"
@@ -94,6 +95,28 @@ TEST(RepairJobTest, ADefectEndsTheJobAndNotTheProgram) {
   EXPECT_EQ(job.to_json()["error"], "a defect of the program ended the repair: made by the test");
   is_defect = false;
   EXPECT_EQ(state_at_the_end(), "done");
+}
+
+// No machine has the memory for the stack of this thread.
+TEST(RepairJobTest, AJobThatGetsNoThreadHasFailed) {
+  Machine machine;
+  RepairJob job(machine.memory.env, [&] { return machine.open(); });
+  pthread_attr_t usual{};
+  pthread_attr_t huge{};
+  ASSERT_EQ(::pthread_getattr_default_np(&usual), 0);
+  ASSERT_EQ(::pthread_getattr_default_np(&huge), 0);
+  ASSERT_EQ(::pthread_attr_setstacksize(&huge, std::size_t{1} << 50U), 0);
+  ASSERT_EQ(::pthread_setattr_default_np(&huge), 0);
+  const auto refused = job.start({"archive", "out", ""});
+  ASSERT_EQ(::pthread_setattr_default_np(&usual), 0);
+  EXPECT_FAILS(refused, ErrorCode::io);
+  EXPECT_EQ(job.to_json()["state"], "failed");
+  EXPECT_THAT(job.to_json()["error"].get<std::string>(), testing::HasSubstr("no more threads"));
+  ASSERT_OK(job.start({"archive", "out", ""}));
+  while (job.to_json()["state"] == "running") {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(job.to_json()["state"], "done");
 }
 
 TEST(RepairJobTest, TheStoreGetsTheRowsOfTheCommand) {

@@ -125,6 +125,36 @@ TEST(Server, AnswersDuringThousandsOfEventStreams) {
   ADD_FAILURE() << "no stream after the others had gone";
 }
 
+// A defect outside handle(): an event stream asks for the state by itself.
+TEST(Server, ADefectInAnEventStreamEndsThatStreamAlone) {
+  class DefectiveBench final : public PracticeBench {
+   public:
+    bool has(const std::string& /*device*/) const override {
+      throw std::runtime_error("no such key");
+    }
+    Status turn(const std::string&, device::Pose, double) override { return {}; }
+    Status lean(const std::string&) override { return {}; }
+    Status knock(const std::string&) override { return {}; }
+    Status set_plugged(const std::string&, bool) override { return {}; }
+    Status swap(const std::string&, const std::string&) override { return {}; }
+  } bench;
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  Api api({}, ApiParts{posix_env(), *station.lanes, *station.repairs, station.sign_in, &bench});
+  const auto server = Server::open(posix_env(), api, {}).value();
+  std::thread serving([&] { server->serve(); });
+  httplib::Client client("127.0.0.1", server->port());
+  client.set_read_timeout(10);
+  client.set_default_headers({{"Authorization", std::string("Bearer ") + Station::kToken}});
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(client.Get("/api/events").error(), httplib::Error::Read) << "closed in the middle";
+    const auto me = client.Get("/api/me");
+    EXPECT_TRUE(me && me->status == 200) << "the others go on";
+  }
+  server->stop();
+  serving.join();
+}
+
 // A plain connection to the station; -1 when this process may open no more.
 int connect_to(const Station& station, int receive_bytes = 0) {
   const int descriptor = socket(AF_INET, SOCK_STREAM, 0);

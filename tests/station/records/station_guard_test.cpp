@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "base/forwarding_files.h"
+#include "open_files_limit.h"
 #include "station/records/made_station.h"
 #include "station/records/run_records.h"
 
@@ -166,6 +168,26 @@ TEST_F(StationGuards, AMemoryThatCannotBeReadOpensNothing) {
     EXPECT_FAILS(held, ErrorCode::configuration);
     EXPECT_THAT(held.error().hint, HasSubstr("removes this file"));
   }
+}
+
+// A disk that does not answer is no station without a memory, and its file is not to be removed.
+TEST_F(StationGuards, AMemoryOnADiskThatFailsOpensNothing) {
+  class FailingDisk final : public ForwardingFiles {
+   public:
+    using ForwardingFiles::ForwardingFiles;
+    Result<FileInfo> info(const std::string& path) override {
+      return fail(ErrorCode::io, "the disk does not answer", path, "check the disk");
+    }
+  } disk(posix_env().files);
+  lock();
+  EXPECT_FAILS(ask("MOS2A1"), ErrorCode::configuration);
+  Env env{env_.env.clock, disk};
+  Result<db::Store> away = fail(ErrorCode::io, "the server does not answer");
+  EXPECT_FAILS(
+      StationGuard(env, folder_ / "memory", default_limits()).may_start(away, "MOS2A1", "A"),
+      ErrorCode::configuration);  // locked: what cannot be looked at is opened all the same
+  const sixpoint::tests::OpenFilesLimit limit(0);
+  EXPECT_FAILS(ask_without_store("MOS2A1"), ErrorCode::io);
 }
 
 }  // namespace
