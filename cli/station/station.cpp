@@ -386,11 +386,6 @@ Status serve(const StationCommandOptions& options, Context& context) {
       const station::JigDue jig_due,
       station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by));
   SIXPOINT_ASSIGN(const auto lock, lock_of_station(state_folder(options), context));
-  // A store that cannot be used is refused before anything is measured.
-  if (const auto store = open_store(context, options.store);
-      !store && store.error().code == ErrorCode::usage) {
-    return fail(store.error());
-  }
   SIXPOINT_ASSIGN(auto token, station::read_or_make_token(context.env.files,
                                                           options.token_file.empty()
                                                               ? state_folder(options) + "/token"
@@ -407,6 +402,10 @@ Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto printer,
                   open_printer(context.env, printer_at, state_folder(options) + "/labels"));
   StationStore store(context, options, lanes_asked.session, jig_due);
+  // A store that cannot be used is refused before anything is measured.
+  if (const auto opened = store.open(); !opened && opened.error().code == ErrorCode::usage) {
+    return fail(opened.error());
+  }
   store.print_to(printer.get());
   const auto open = [&] { return store.open(); };
   station::QualityControl quality(open, options.station, lanes_asked.session.limits,
