@@ -621,6 +621,7 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
   found.erase(end, found.end());
   // Of the lags that chance does not give, the one at which the recordings fit best.
   std::vector<double> misfit;
+  misfit.reserve(found.size());
   for (const Fitted& fitted : found) {
     misfit.push_back(1 - whole_correlation(a, b, fitted.line));
   }
