@@ -127,6 +127,7 @@ Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::st
   // The first free name: two processes that write the same target must not share a temporary file.
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);
+    const UntilNoted until_noted;
     auto file = files.create(temporary);
     if (file) {
       note_temporary(temporary);

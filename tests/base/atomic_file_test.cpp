@@ -1,7 +1,10 @@
 #include "base/atomic_file.h"
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -134,6 +137,46 @@ TEST(Temporaries, AreRemovedAsTheyAreNoted) {
       },
       testing::ExitedWithCode(0), "");
   EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre("done"));
+}
+
+// The process is told to end right after the file was created, on the thread that creates it or on
+// another: the file is noted first.
+TEST(Temporaries, OneThatIsJustCreatedIsRemovedToo) {
+  class ToldToEnd final : public ForwardingFiles {
+   public:
+    ToldToEnd(FileSystem& files, bool elsewhere) : ForwardingFiles(files), elsewhere_(elsewhere) {}
+    Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+      auto file = ForwardingFiles::create(path);
+      if (elsewhere_) {
+        std::thread(end).detach();
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      } else {
+        static_cast<void>(::raise(SIGTERM));
+      }
+      return file;
+    }
+    static void end() {
+      remove_noted_temporaries();
+      ::_exit(0);
+    }
+
+   private:
+    bool elsewhere_;
+  };
+  for (const bool elsewhere : {false, true}) {
+    SCOPED_TRACE(elsewhere);
+    const tests::TemporaryFolder folder;
+    EXPECT_EXIT(
+        {
+          ::signal(SIGTERM, [](int) { ToldToEnd::end(); });
+          ToldToEnd files(posix_env().files, elsewhere);
+          static_cast<void>(AtomicFile::create(files, folder / "f"));
+          ::sleep(30);
+          ::_exit(1);
+        },
+        testing::ExitedWithCode(0), "");
+    EXPECT_THAT(*posix_env().files.list(folder.path()), testing::IsEmpty());
+  }
 }
 
 // A disk whose rule is `how` for every file, with a pipe that takes everything.
