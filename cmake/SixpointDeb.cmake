@@ -93,7 +93,9 @@ sixpoint_deb(STATION sixpoint-station science "sixpoint ${same_version}"
 by systemd without a user of its own, with access to the units and jigs alone.
 It does not start by itself: name its devices in /etc/default/sixpoint-station.")
 set(CPACK_DEBIAN_STATION_PACKAGE_ARCHITECTURE all)
-set(CPACK_DEBIAN_STATION_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/deb/conffiles)
+set(station_control_files conffiles postinst prerm postrm)
+list(TRANSFORM station_control_files PREPEND ${PROJECT_SOURCE_DIR}/packaging/deb/ OUTPUT_VARIABLE
+     CPACK_DEBIAN_STATION_PACKAGE_CONTROL_EXTRA)
 sixpoint_deb(DEV libsixpoint-dev libdevel
   "libdeflate-dev, libeigen3-dev, libfmt-dev, libhidapi-dev, libisal-dev, libssl-dev, \
 libexpected-dev, libudev-dev, libusb-1.0-0-dev, libzip-dev, nlohmann-json3-dev, pkg-config, zlib1g-dev"

@@ -101,13 +101,21 @@ void fill_axis(const sixpoint_reading& reading, std::size_t axis, double* values
   constexpr int kLeast = -32768;
   std::vector<double> value_of(65536);  // of each count
   for (std::size_t i = 0; i < scales.size(); ++i) {
-    const double scale = scales[i].lsb_per_g;
-    for (int count = kLeast; count < -kLeast; ++count) {
-      value_of[static_cast<std::size_t>(count - kLeast)] =
-          scale > 0 ? static_cast<double>(gt3x::round_to_mg(count, scale)) / 1000 : count;
-    }
+    const auto value_g = [scale = scales[i].lsb_per_g](int count) -> double {
+      return scale > 0 ? static_cast<double>(gt3x::round_to_mg(count, scale)) / 1000 : count;
+    };
+    const std::uint64_t begin = scales[i].first_row;
     const std::uint64_t end = i + 1 < scales.size() ? scales[i + 1].first_row : reading.rows.rows;
-    for (std::uint64_t row = scales[i].first_row; row < end; ++row) {
+    if (end < begin + value_of.size()) {  // fewer than the table has
+      for (std::uint64_t row = begin; row < end; ++row) {
+        values_g[row] = value_g(rows[row][axis]);
+      }
+      continue;
+    }
+    for (int count = kLeast; count < -kLeast; ++count) {
+      value_of[static_cast<std::size_t>(count - kLeast)] = value_g(count);
+    }
+    for (std::uint64_t row = begin; row < end; ++row) {
       values_g[row] = value_of[static_cast<std::size_t>(rows[row][axis] - kLeast)];
     }
   }

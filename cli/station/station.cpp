@@ -102,7 +102,7 @@ class StationStore {
     const std::lock_guard lock(mutex_);
     SIXPOINT_ASSIGN(const bool is_kept_beside,
                     cli::is_kept_beside(context_.env.files, options_.store, waiting.id));
-    auto store = open_existing_store(context_, options_.store);
+    auto store = asked(open_existing_store);
     return station::may_write(store, waiting.serial, waiting.id, is_kept_beside);
   }
   Result<station::RunInStore> add_run(const station::JigReport& measured,
@@ -124,11 +124,11 @@ class StationStore {
   // A store that was there and is not is on a disk that is away: no new one takes its place, and the
   // journal keeps what is measured.
   Result<db::Store> opened() {
-    auto store = was_there_ ? open_existing_store(context_, options_.store)
-                            : open_store(context_, options_.store);
+    auto store = asked(was_there_ ? open_existing_store : open_store);
     was_there_ = was_there_ || store.has_value();
     return store;
   }
+  Result<db::Store> asked(Result<db::Store> (*open)(Context&, const std::string&));
   void print_label(const db::RunRecord& run);
 
   Context context_;
@@ -139,7 +139,26 @@ class StationStore {
   station::LabelPrinter* printer_ = nullptr;
   std::mutex mutex_;
   bool was_there_ = false;  // the store
+  std::chrono::nanoseconds silent_until_{0};
+  Error silence_;
 };
+
+// A server that gives no answer costs each question ten seconds, and lanes and page would wait for
+// one another: it is not asked again for half a minute. The journal keeps what is measured.
+Result<db::Store> StationStore::asked(Result<db::Store> (*open)(Context&, const std::string&)) {
+  constexpr std::chrono::seconds kSlow{1};  // what is refused, or is not there, says so at once
+  constexpr std::chrono::seconds kNotAsked{30};
+  const auto begun = context_.env.clock.elapsed();
+  if (begun < silent_until_) {
+    return fail(silence_);
+  }
+  auto store = open(context_, options_.store);
+  if (const auto ended = context_.env.clock.elapsed(); !store && ended - begun > kSlow) {
+    silent_until_ = ended + kNotAsked;
+    silence_ = store.error();
+  }
+  return store;
+}
 
 // A label that cannot be kept for the printer is no reason to lose the run: it can be printed
 // again.
@@ -157,7 +176,7 @@ void StationStore::print_label(const db::RunRecord& run) {
 
 Status StationStore::print_again(const std::string& run_id) {
   const std::lock_guard lock(mutex_);
-  SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
+  SIXPOINT_ASSIGN(db::Store store, asked(open_existing_store));
   SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
   SIXPOINT_ASSIGN(const std::string zpl, station::label_zpl(run));
   return printer_->add_again({run.id, run.serial, zpl});
@@ -201,7 +220,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
 Result<station::RunDocument> StationStore::document(const std::string& run_id,
                                                     const std::string& kind) {
   const std::lock_guard lock(mutex_);
-  SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
+  SIXPOINT_ASSIGN(db::Store store, asked(open_existing_store));
   SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
   if (kind == "report.json") {
     Json json = cli::document("jig");

@@ -15,7 +15,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostNameBytes = 60;
-constexpr std::size_t kMostNamesTried = 256;  // that wrong PINs are counted for
 constexpr std::uint64_t kMostFileBytes = 1U << 20U;
 
 tl::unexpected<Error> wrong_pin() {
@@ -140,6 +139,9 @@ Status Operators::disable(const std::string& name) {
 Result<Operator> Operators::sign_in(const std::string& where, const std::string& name,
                                     const std::string& pin) {
   SIXPOINT_ASSIGN(const auto entries, read());
+  const auto found = std::ranges::find(
+      entries, name, [](const Entry& entry) -> const std::string& { return entry.is.name; });
+  const bool known = found != entries.end();
   {
     const std::lock_guard lock(mutex_);
     const auto now = env_.clock.elapsed();
@@ -148,7 +150,7 @@ Result<Operator> Operators::sign_in(const std::string& where, const std::string&
     }
     std::erase_if(wrong_pins_, [](const auto& each) { return each.second.empty(); });
     const auto wrong = wrong_pins_.find(name);
-    if (wrong_pins_.size() >= kMostNamesTried ||
+    if ((!known && wrong_pins_.size() >= kMostNamesTried) ||
         (wrong != wrong_pins_.end() && wrong->second.size() >= kMostWrongPins)) {
       return fail(ErrorCode::permission, "too many wrong PINs", printable(name, 80),
                   "wait a minute, then try again");
@@ -156,9 +158,6 @@ Result<Operator> Operators::sign_in(const std::string& where, const std::string&
     // Counted before it is compared: many at once are no more tries than one after the other.
     wrong_pins_[name].push_back(now);
   }
-  const auto found = std::ranges::find(
-      entries, name, [](const Entry& entry) -> const std::string& { return entry.is.name; });
-  const bool known = found != entries.end();
   const bool right = same_secret(pin_hash(pin, known ? found->salt : std::string("no operator")),
                                  known ? found->pin_hash : std::string());
   if (!known || !right) {

@@ -31,6 +31,8 @@
 // | known     | wrong | fewer                                    | permission error              |
 // | not known | any   | fewer                                    | the same, after the same work |
 // | any       | any   | kMostWrongPins or more                   | permission error: wait        |
+// | not known | any   | fewer, and kMostNamesTried names have    | permission error: wait        |
+// |           |       | wrong ones                               |                               |
 //
 // May be called from any thread.
 #pragma once
@@ -49,6 +51,7 @@ namespace sixpoint::station {
 inline constexpr std::chrono::minutes kIdle{10};
 inline constexpr std::chrono::seconds kPinWait{60};
 inline constexpr std::size_t kMostWrongPins = 5;
+inline constexpr std::size_t kMostNamesTried = 256;  // so that made-up ones take no memory
 
 enum class OperatorRole { technician, engineer };  // an engineer also signs for the station
 std::string_view to_string(OperatorRole role);

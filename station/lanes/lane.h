@@ -171,7 +171,6 @@ class Lanes::Lane {
   void end_without_report(const std::string& serial, const Error& error);
   void end_unmeasured(const std::string& serial, const char* verdict,
                       std::vector<std::string> reasons, std::string message);
-  void end_refused(const std::string& serial, const Error& error);
   void continue_run(const std::stop_token& stop, const UnfinishedRun& left);
   void end_interrupted(const UnfinishedRun& left, const std::string& reason, ErrorCode code);
   // The verdict is shown at once; store_result() follows.

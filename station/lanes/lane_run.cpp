@@ -91,8 +91,11 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   const auto allowed = check_write(state).and_then([&] { return check_start(state.serial); });
   if (!allowed) {
     const Error& why = allowed.error();
-    return left && !order.last_run ? end_interrupted(*left, "interrupted: " + why.brief(), why.code)
-                                   : end_refused(state.serial, why);
+    if (left && !order.last_run) {
+      return end_interrupted(*left, "interrupted: " + why.brief(), why.code);
+    }
+    // Constants that wait, wait on: what the refusal is about may be put right.
+    return end_unmeasured(state.serial, "refused", {why.what, why.hint}, why.brief());
   }
   if (order.last_run) {
     // For a program that goes on with it: the store has this run's samples, and their file is gone.
@@ -297,11 +300,6 @@ void Lanes::Lane::end_unmeasured(const std::string& serial, const char* verdict,
             {"reasons", std::move(reasons)},
             {"stored", false}},
            std::move(message));
-}
-
-// Constants that wait, wait on: what the refusal is about may be put right.
-void Lanes::Lane::end_refused(const std::string& serial, const Error& error) {
-  end_unmeasured(serial, "refused", {error.what, error.hint}, error.brief());
 }
 
 void Lanes::Lane::show_result(const JigReport& report, const RunLabels& labels) {

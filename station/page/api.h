@@ -185,6 +185,7 @@ class EventStream {
   std::vector<std::uint64_t> seen_changes_;
   std::vector<std::uint64_t> next_reading_;
   std::uint64_t seen_job_ = 0;
+  std::chrono::nanoseconds last_job_event_{0};
   std::uint64_t seen_lock_ = 0;
   std::uint64_t seen_printer_ = 0;
   std::vector<std::size_t> seen_queue_;

@@ -9,6 +9,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kHeartbeat{5};
+// A job's event lists its files: half a megabyte of a large one, which has many files a second.
+constexpr std::chrono::seconds kBetweenJobEvents{1};
 
 void add_event(std::string& text, std::string_view name, const Json& data) {
   text += "event: ";
@@ -60,7 +62,10 @@ void EventStream::add_changes(std::string& text) {
       add_event(text, "lane", parts.lanes.to_json(i + 1));
     }
   }
-  if (has_changed(seen_job_, parts.repairs.changes())) {
+  const auto now = parts.env.clock.elapsed();
+  if (now - last_job_event_ >= kBetweenJobEvents &&
+      has_changed(seen_job_, parts.repairs.changes())) {
+    last_job_event_ = now;
     add_event(text, "job", parts.repairs.to_json());
   }
   if (parts.printer != nullptr && has_changed(seen_printer_, parts.printer->changes())) {

@@ -26,7 +26,18 @@ mount -t overlay overlay -o "lowerdir=/,upperdir=$scratch/up,workdir=$scratch/wo
 root=$scratch/root
 for folder in proc dev; do mount --rbind "/$folder" "$root/$folder"; done
 for folder in run tmp; do mount -t tmpfs tmpfs "$root/$folder"; done
-inside=(chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8)
+inside=(chroot "$root" /usr/bin/env -i PATH=/run/tools:/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8)
+# What the packages tell systemd, which does not run in there.
+mkdir -p "$root/run/systemd/system" "$root/run/tools"
+printf '#!/bin/sh\necho "$*" >>/run/told\n' >"$root/run/tools/systemctl"
+chmod 755 "$root/run/tools/systemctl"
+told() { # told STEP LINE...: these lines, in their order, and no others
+  local step=$1
+  shift
+  printf '%s\n' "$@" | diff - "$root/run/told" || failed "$step told systemd something else"
+  rm -f "$root/run/told"
+}
+reload="--system daemon-reload" service=sixpoint-station.service
 # What is installed anywhere but in the state of dpkg itself, its log and the caches that it rebuilds.
 files() {
   (cd "$scratch/up" && find . ! -type d ! -path './var/lib/dpkg/*' ! -path './var/log/*' ! -path './var/cache/*' \
@@ -50,6 +61,9 @@ install() {
 "${inside[@]}" useradd --create-home person
 files >"$scratch/before"
 install $(find "$root/srv/old" -name '*.deb' -printf '/srv/old/%f\n') || exit 1
+told "the installation" "$reload"
+mkdir -p "$root/etc/systemd/system/multi-user.target.wants"
+ln -s "/lib/systemd/system/$service" "$root/etc/systemd/system/multi-user.target.wants/$service" # 'systemctl enable'
 
 # An ordinary user's main job, from there.
 as_person() { "${inside[@]}" setpriv --reuid=person --regid=person --clear-groups env HOME=/home/person sixpoint "$@"; }
@@ -102,6 +116,7 @@ serve
 recorded >"$scratch/recorded"
 sed -i 's/seed=7/seed=8/' "$root/etc/default/sixpoint-station"
 install $(find "$root/srv/new" -name '*.deb' -printf '/srv/new/%f\n') || exit 1
+told "the upgrade" "$reload" "try-restart $service"
 [ "$(as_person --version)" = "sixpoint $version" ] || failed "the new version does not run"
 grep -q seed=8 "$root/etc/default/sixpoint-station" || failed "the upgrade took the user's configuration away"
 [ "$(repairs)" = 1 ] || failed "the upgrade lost the person's store"
@@ -111,6 +126,7 @@ recorded >"$scratch/recorded"
 
 # Removed: nothing is left but what people and stations recorded.
 log=$("${inside[@]}" dpkg --purge libsixpoint-mocks-dev libsixpoint-dev sixpoint-station sixpoint 2>&1) || failed "purge: $log"
+told "the removal" "stop $service" "$reload"
 files | comm -13 "$scratch/before" - | grep -v '^./var/lib/sixpoint/' >"$scratch/left" || true
 [ ! -s "$scratch/left" ] || failed "left behind: $(cat "$scratch/left")"
 [ -f "$root/var/lib/sixpoint/store.db" ] && recorded | diff "$scratch/recorded" - ||

@@ -55,6 +55,8 @@ stopifnot(grepl(error$hint, conditionMessage(error), fixed = TRUE))
 
 found <- scan_16cpan03(c("day1.gt3x", broken))
 stopifnot(identical(found$verdict, c("affected", "unreadable")), attr(found, "summary")[["affected"]] == 1)
+away <- tryCatch(scan_16cpan03("day1.gt3x", store = "~/none.db"), sixpoint_error = function(e) e)
+stopifnot(away$code == "no_input", away$where == path.expand("~/none.db"), away$where != "~/none.db")
 repaired <- repair_16cpan03("day1.gt3x", "out", scan = TRUE)
 stopifnot(repaired$status == "repaired", file.exists(repaired$output))
 stopifnot(repaired$still_error_after_mg < repaired$still_error_before_mg)

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include <arpa/inet.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include "cli/command_fixture.h"
@@ -29,6 +30,42 @@ std::string get(int port, const std::string& path, const std::string& more_head 
                               "\r\nConnection: close\r\n" + more_head + "\r\n";
   return tests::answer_to(address, request);
 }
+
+// Accepts and never answers.
+class SilentServer {
+ public:
+  SilentServer() : listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(listener_, 16), 0);
+    EXPECT_EQ(::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    port_ = ntohs(address.sin_port);
+  }
+  ~SilentServer() { ::close(listener_); }
+  SilentServer(const SilentServer&) = delete;
+  SilentServer& operator=(const SilentServer&) = delete;
+  int listener() const { return listener_; }
+  std::string store() const {
+    return "postgresql://reader@127.0.0.1:" + std::to_string(port_) + "/none?sslmode=disable";
+  }
+  // That nobody has accepted yet.
+  int connections() const {
+    pollfd waiting{listener_, POLLIN, 0};
+    int number = 0;
+    while (::poll(&waiting, 1, 0) == 1) {
+      ::close(::accept(listener_, nullptr, nullptr));
+      ++number;
+    }
+    return number;
+  }
+
+ private:
+  int listener_;
+  int port_ = 0;
+};
 
 class StationCommand : public tests::CommandTest {
  protected:
@@ -324,25 +361,28 @@ TEST_F(StationCommand, OperatorsAreNamedWithAPin) {
 // A store that accepts and never answers holds a thread of the station for ten seconds; the station
 // ends without it, and says so.
 TEST_F(StationCommand, EndsInTimeWhateverItsThreadsWaitFor) {
-  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof(address);
-  ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
-  ASSERT_EQ(::listen(listener, 16), 0);
-  ASSERT_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  const SilentServer server;
   // The first question, before the page is served, is refused at once.
-  std::jthread refuser([listener] { ::close(::accept(listener, nullptr, nullptr)); });
+  std::jthread refuser([&] { ::close(::accept(server.listener(), nullptr, nullptr)); });
   testing::internal::CaptureStderr();
   Child station({"station", "--port", "0", "--device", "virtual:seed=7", "--state", path("state"),
-                 "--files", path("."), "--store",
-                 "postgresql://reader@127.0.0.1:" + std::to_string(ntohs(address.sin_port)) +
-                     "/none?sslmode=disable"});
+                 "--files", path("."), "--store", server.store()});
   ASSERT_THAT(station.line(), StartsWith("http://"));
   EXPECT_EQ(station.stop(SIGTERM), 0);
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("ended while a lane was at work"));
-  ::close(listener);
+}
+
+// Each question would wait for the server's time-out, and hold up lanes and page.
+TEST_F(StationCommand, AStoreThatDoesNotAnswerIsNotAskedAtEachQuestion) {
+  const SilentServer server;
+  Child station({"station", "--port", "0", "--device", "virtual:seed=7", "--state", path("state"),
+                 "--files", path("."), "--store", server.store() + "&connect_timeout=2"});
+  const int port = port_of(station.line());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_THAT(get(port, "/api/runs", head()), HasSubstr("timeout"));
+  }
+  EXPECT_EQ(station.stop(SIGTERM), 0);
+  EXPECT_EQ(server.connections(), 1) << "before the page was served";
 }
 
 // The jig's due date holds on the page as in the terminal. Oracle: the answer of the lane.

@@ -153,6 +153,16 @@ TEST_F(OperatorsTest, PinsAreNotTriedOut) {
   EXPECT_OK(operators_.sign_in("b", "Ada", "471100"));
 }
 
+TEST_F(OperatorsTest, MadeUpNamesHoldUpNoOperator) {
+  add_both();
+  for (std::size_t i = 0; i < kMostNamesTried; ++i) {
+    EXPECT_FAILS(operators_.sign_in("a", "nobody " + std::to_string(i), "1234"),
+                 ErrorCode::permission);
+  }
+  EXPECT_THAT(operators_.sign_in("a", "nobody", "1234").error().what, HasSubstr("too many"));
+  EXPECT_OK(operators_.sign_in("b", "Ada", "471100"));
+}
+
 TEST_F(OperatorsTest, TheFileHoldsNoPin) {
   add_both();
   EXPECT_THAT(file(), Not(HasSubstr("471100")));

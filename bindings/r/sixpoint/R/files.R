@@ -1,5 +1,5 @@
 scan_16cpan03 <- function(paths, jobs = 0L, store = "") {
-  json <- answer_of(.Call(C_scan_json, enc2native(paths), options_json(jobs = as.integer(jobs), store = store)))
+  json <- answer_of(.Call(C_scan_json, enc2native(paths), options_json(jobs = as.integer(jobs), store = path.expand(store))))
   document <- jsonlite::fromJSON(json, simplifyVector = FALSE)
   files <- document$files
   text <- function(key) vapply(files, function(file) null_to_na(file[[key]], NA_character_), "")
@@ -21,7 +21,8 @@ repair_16cpan03 <- function(paths, output, constants = "", calibration_file = ""
                             force = FALSE, dry_run = FALSE, resume = FALSE,
                             redo_outdated = FALSE, link_unaffected = "", jobs = 0L) {
   options <- options_json(
-    constants = constants, calibration_file = calibration_file, scan = scan, store = store,
+    constants = path.expand(constants), calibration_file = path.expand(calibration_file),
+    scan = scan, store = path.expand(store),
     or_scan = or_scan, no_pool = no_pool, wide = wide, store_only = store_only,
     undo_rotation = undo_rotation,
     allow_prior = allow_prior, salvage = salvage, force = force, dry_run = dry_run,
