@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
+
 namespace sixpoint::calib {
 
 namespace {
@@ -389,7 +391,7 @@ Result<ConstantsRecord> parse_constants_record(std::string_view text) {
   }
   // Without a callback and with exceptions off; nesting is bounded by the size limit and the parser
   // is not recursive.
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (json.is_discarded()) {
     return fail(ErrorCode::bad_data, "is not JSON", "constants.json",
                 "give a file written by 'sixpoint solve -o'");

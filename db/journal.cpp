@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "db/export_json.h"
 
 namespace sixpoint::db {
@@ -110,7 +111,7 @@ Result<NewRows> rows_of_version_1(const Json& entry) {
 }
 
 Result<NewRows> rows_from(const std::string& record) {
-  const Json entry = Json::parse(record, nullptr, false);
+  const Json entry = parse_json(record);
   try {
     return entry.contains("kind") ? rows_of_version_1(entry) : rows_of_entry(entry);
   } catch (const Json::exception&) {
@@ -165,7 +166,7 @@ Result<std::string> Journal::add(NewRows rows) {
 }
 
 Status Journal::give(const std::string& path, const Bytes& entry, Store& store) {
-  const Json line = Json::parse(entry.begin(), entry.end(), nullptr, false);
+  const Json line = parse_json(as_text(entry));
   const bool whole = line.is_object() && line.contains("record") && line["record"].is_string() &&
                      line.contains("sha256");
   const std::string record = whole ? line["record"].get<std::string>() : "";

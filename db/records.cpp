@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "base/text/utf8.h"
 #include "db/chain.h"
 #include "db/name_rule.h"
@@ -126,11 +127,11 @@ void from_value(const Value& value, std::optional<UtcTime>& time) {
                                                        : std::optional(from_ns(integer_of(value)));
 }
 void from_value(const Value& value, std::optional<double>& number) {
-  const Json json = Json::parse(text_of(value), nullptr, false);
+  const Json json = parse_json(text_of(value));
   number = json.is_number() ? std::optional(json.get<double>()) : std::nullopt;
 }
 void from_value(const Value& value, std::vector<std::string>& texts) {
-  const Json json = Json::parse(text_of(value), nullptr, false);
+  const Json json = parse_json(text_of(value));
   for (const Json& one : json.is_array() ? json : Json::array()) {
     texts.push_back(one.is_string() ? one.get<std::string>() : one.dump());
   }
@@ -208,7 +209,7 @@ Result<Row> new_row(const Table& table, Row columns) {
   }
   if (table.name == "constants") {
     // Copied from the document for people's statements, so no part of the id.
-    const Json document = Json::parse(text_of(columns[5]), nullptr, false);
+    const Json document = parse_json(text_of(columns[5]));
     columns[6] = member_of(document, "standard_uncertainty");
     columns[7] = member_of(document, "made_from");
   }

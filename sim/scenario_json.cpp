@@ -9,6 +9,7 @@
 
 #include "base/random.h"
 #include "base/text/json_keys.h"
+#include "base/text/json_text.h"
 #include "sim/firmware.h"
 #include "sim/scenario.h"
 #include "sim/scenario_section.h"
@@ -502,7 +503,7 @@ Result<Scenario> parse_scenario(std::string_view json) {
   if (const auto doubled = doubled_json_key(json)) {
     return wrong(*doubled, "this key stands twice");
   }
-  const Json document = Json::parse(json, nullptr, false);
+  const Json document = parse_json<Json>(json);
   if (document.is_discarded()) {
     return wrong("", "this is not JSON");
   }

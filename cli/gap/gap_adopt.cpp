@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_sources.h"
@@ -23,7 +24,7 @@ struct GapAdoptCommandOptions {
 };
 
 bool is_json_object(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   return json.is_object();
 }
 

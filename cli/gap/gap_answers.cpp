@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/gap/gap_commands.h"
 #include "cli/output.h"
@@ -70,7 +71,7 @@ Result<std::vector<std::string>> bundles_of(FileSystem& files, const std::string
     return fail(ErrorCode::bad_data, what, file, "give the folder that --export wrote");
   };
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, file));
-  const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
+  const Json json = parse_json(as_text(text));
   if (!json.is_object() || !json.contains("bundles") || !json["bundles"].is_array()) {
     return bad("this is no list of bundles");
   }

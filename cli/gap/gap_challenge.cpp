@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "cli/child_process.h"
 #include "cli/command.h"
 #include "cli/gap/challenge_scores.h"
@@ -112,7 +113,7 @@ Status diagnose(Env& env, const std::vector<std::string>& arguments, const std::
     return {};
   }
   SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
-  gap::read_answer(nlohmann::json::parse(text.begin(), text.end(), nullptr, false), outcome);
+  gap::read_answer(parse_json<nlohmann::json>(as_text(text)), outcome);
   return {};
 }
 

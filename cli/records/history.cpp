@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "calib/constants.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
@@ -26,7 +27,7 @@ struct HistoryCommandOptions {
 
 // The JSON text of a column; null where it is empty.
 Json json_in(const std::string& text) {
-  Json json = Json::parse(text, nullptr, false);
+  Json json = parse_json(text);
   return json.is_discarded() ? Json(nullptr) : json;
 }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/people_text.h"
@@ -290,7 +291,7 @@ Result<Answer> trend(const StoreCommandOptions& options, Context& context) {
   Json& list = answer.json["points"] = Json::array();
   Columns table({"made", "filter", "method", "jig", "id", "verdict", "values"});
   for (const auto& point : points) {
-    const Json constants = Json::parse(point.constants.document, nullptr, false);
+    const Json constants = parse_json(point.constants.document);
     list.push_back({{"made_at", to_iso8601(point.constants.made_at)},
                     {"id", point.constants.id},
                     {"filter", point.constants.filter},

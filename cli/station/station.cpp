@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
 #include "cli/devices/replay_rule.h"
@@ -128,7 +129,7 @@ class StationStore {
     was_there_ = was_there_ || store.has_value();
     return store;
   }
-  Result<db::Store> asked(Result<db::Store> (*open)(Context&, const std::string&));
+  Result<db::Store> asked(Result<db::Store> (*ask)(Context&, const std::string&));
   void print_label(const db::RunRecord& run);
 
   Context context_;
@@ -145,14 +146,14 @@ class StationStore {
 
 // A server that gives no answer costs each question ten seconds, and lanes and page would wait for
 // one another: it is not asked again for half a minute. The journal keeps what is measured.
-Result<db::Store> StationStore::asked(Result<db::Store> (*open)(Context&, const std::string&)) {
+Result<db::Store> StationStore::asked(Result<db::Store> (*ask)(Context&, const std::string&)) {
   constexpr std::chrono::seconds kSlow{1};  // what is refused, or is not there, says so at once
   constexpr std::chrono::seconds kNotAsked{30};
   const auto begun = context_.env.clock.elapsed();
   if (begun < silent_until_) {
     return fail(silence_);
   }
-  auto store = open(context_, options_.store);
+  auto store = ask(context_, options_.store);
   if (const auto ended = context_.env.clock.elapsed(); !store && ended - begun > kSlow) {
     silent_until_ = ended + kNotAsked;
     silence_ = store.error();
@@ -225,7 +226,7 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
   if (kind == "report.json") {
     Json json = cli::document("jig");
     json["run"] = run.id;
-    const Json report = Json::parse(run.document, nullptr, /*allow_exceptions=*/false);
+    const Json report = parse_json(run.document);
     if (!report.is_object()) {
       return fail(ErrorCode::bad_data, "the stored report cannot be read", printable(run.id, 80),
                   "see whether the store is damaged: 'sixpoint audit verify'");

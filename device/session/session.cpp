@@ -9,6 +9,7 @@
 
 #include "base/sha256.h"
 #include "base/text/json_keys.h"
+#include "base/text/json_text.h"
 #include "device/session/session_archive.h"
 #include "device/session/session_journal.h"
 #include "gt3x/recording_writer.h"
@@ -71,7 +72,7 @@ Sha256Digest digest_of(std::string_view text) { return sha256(as_bytes(text)); }
 }  // namespace
 
 Result<SessionTransfer> parse_line(std::string_view line, const std::string& where) {
-  const Json json = Json::parse(line, nullptr, false);
+  const Json json = parse_json(line);
   if (!json.is_object()) {
     return broken("this line is no transfer", where);
   }
@@ -214,7 +215,7 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
   if (const auto doubled = doubled_json_key(head_text)) {
     return broken(fmt::format("session.json has the key {} twice", printable(*doubled, 100)), path);
   }
-  const Json head = Json::parse(head_text, nullptr, false);
+  const Json head = parse_json(head_text);
   const auto member = [&head](const char* key) {
     return head.is_object() && head.contains(key) ? head[key] : Json();
   };

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "device/session/session_archive.h"
 
 namespace sixpoint::device {
@@ -85,7 +86,7 @@ class Lines {
 };
 
 Result<SessionHead> parse_first_line(std::string_view line, const std::string& journal) {
-  const Json json = Json::parse(line, nullptr, false);
+  const Json json = parse_json(line);
   const auto text = [&json](const char* key) {
     const bool has = json.is_object() && json.contains(key) && json[key].is_string();
     return has ? json[key].get<std::string>() : std::string();

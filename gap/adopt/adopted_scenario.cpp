@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "sim/scenario.h"
 
 namespace sixpoint::gap {
@@ -67,7 +68,7 @@ Result<Earlier> read_earlier(std::string_view text) {
   };
   Earlier earlier;
   try {
-    earlier.scenario = Json::parse(text);
+    earlier.scenario = parse_json(text);
     for (const Json& effect : earlier.scenario.value("effects", Json::array())) {
       earlier.own.insert(effect.at("name").get<std::string>());
     }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 
 namespace sixpoint::gap {
 
@@ -180,7 +181,7 @@ bool every_unit_has_some(std::string_view effect) {
 }
 
 Result<DocumentEvidence> read_evidence(std::string_view text, const std::string& source) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (!json.is_object() || json.value("schema", Json()) != "sixpoint/gap-diagnose/1") {
     return bad(source, "this is no diagnosis");
   }

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "gap/explain/forward.h"
 #include "sim/scenario.h"
 
@@ -75,7 +76,7 @@ Result<std::vector<LearntSize>> learnt_sizes(std::string_view scenario,
                                              const LearntSizesOptions& options) {
   // Checks it, and drops `units` and `standard_uncertainty`.
   SIXPOINT_ASSIGN(const sim::Scenario parsed, sim::parse_scenario(scenario));
-  const Json text = Json::parse(scenario);
+  const Json text = parse_json(scenario);
   if (!text.contains("population")) {
     return fail(ErrorCode::configuration, "this scenario has no population", "/population",
                 "sixpoint gap adopt writes one; docs/scenario.md describes every key");

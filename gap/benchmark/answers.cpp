@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "gap/benchmark/json_lines.h"
 #include "sim/effects/effect.h"
 
@@ -90,7 +91,7 @@ Status read_where(const Json& unknown, const std::string& source, Answer& answer
 Status add_lines(std::string_view text, const std::string& path, std::vector<Answer>& answers) {
   for (const auto& [line, row] : rows_of(text)) {
     const std::string source = fmt::format("{}, line {}", path, line);
-    const Json json = Json::parse(row, nullptr, false);
+    const Json json = parse_json(row);
     const Json* bundle = member(json, "bundle");
     if (bundle == nullptr || !bundle->is_string()) {
       return bad_answer(source, "a line is one JSON object with the member bundle");
@@ -136,7 +137,7 @@ Result<std::vector<Answer>> read_answers(FileSystem& files, const std::string& p
       if (name.ends_with(kEnding)) {
         const std::string file = fmt::format("{}/{}", path, name);
         SIXPOINT_ASSIGN(const Bytes text, read_file(files, file));
-        const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
+        const Json json = parse_json(as_text(text));
         SIXPOINT_ASSIGN(Answer answer,
                         parse_answer(json, name.substr(0, name.size() - kEnding.size()), file));
         answers.push_back(std::move(answer));

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
+#include "base/text/json_text.h"
 #include "gap/benchmark/json_lines.h"
 #include "gap/benchmark/shown.h"
 
@@ -181,7 +182,7 @@ Result<Labels> parse_labels(std::string_view text) {
   Labels labels;
   std::set<std::string> names;
   for (const auto& [line, row] : rows_of(text)) {
-    const Json json = Json::parse(row, nullptr, false);
+    const Json json = parse_json(row);
     if (line == 1) {
       if (!json.is_object() || json.value("schema", Json()) != kSchema) {
         return tl::unexpected(bad_label(line, fmt::format("this is no file of {}", kSchema)));

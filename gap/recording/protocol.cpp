@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
+
 namespace sixpoint::gap {
 namespace {
 
@@ -254,7 +256,7 @@ void number_placements(Bundle& bundle) {
 
 Status read_protocol(FileSystem& files, const std::string& path, Bundle& bundle) {
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, path));
-  const Json protocol = Json::parse(text, nullptr, false);
+  const Json protocol = parse_json<Json>(as_text(text));
   if (protocol.is_discarded() || !protocol.is_object()) {
     return bad(path, "no JSON object");
   }

@@ -10,6 +10,7 @@
 
 #include "base/serial.h"
 #include "base/text/json_keys.h"
+#include "base/text/json_text.h"
 
 namespace sixpoint::mocks {
 
@@ -220,7 +221,7 @@ Result<FaultPlan> parse_fault_plan(std::string_view text) {
   if (const auto doubled = doubled_json_key(text)) {
     return wrong(*doubled, "this key stands twice");
   }
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json<Json>(text);
   if (json.is_discarded() || !json.is_object()) {
     return wrong("", "this is no JSON object");
   }

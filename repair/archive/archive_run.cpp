@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "repair/archive/archive_json.h"
 #include "repair/archive/archive_scripts.h"
 #include "repair/archive/output_lock.h"
@@ -316,7 +317,7 @@ Result<std::optional<std::string>> output_folder_of(FileSystem& files, const std
     }
     return fail(bytes.error());
   }
-  const Json json = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  const Json json = parse_json(as_text(*bytes));
   if (!json.is_object() || !json.contains("output_folder") || !json["output_folder"].is_string()) {
     return fail(ErrorCode::bad_data, "the file that names the output folder is damaged", path,
                 "remove it, and name the same folder again");

@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "repair/archive/archive_json.h"
 #include "repair/archive/archive_scripts.h"
 #include "repair/rescale/earlier_output.h"
@@ -173,7 +174,7 @@ std::optional<int> version_of(const Json& json) {
 }
 
 Result<ArchiveFile> file_of(std::string_view line, const ArchivePlan& plan) {
-  const Json json = Json::parse(line, nullptr, false);
+  const Json json = parse_json(line);
   ArchiveFile file;
   try {
     file.root = integer_of<std::size_t>(json.at("root"));
@@ -257,7 +258,7 @@ Result<ArchivePlan> read_plan(FileSystem& files, const std::string& folder) {
     }
     return fail(std::move(error));
   }
-  Json json = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  Json json = parse_json(as_text(*bytes));
   const auto version = version_of(json);
   if (!version) {
     return fail(ErrorCode::bad_data, "this is no plan of an archive, or it is damaged", path,

@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "repair/archive/archive_json.h"
 
 namespace sixpoint::repair {
@@ -130,7 +131,7 @@ Result<ShardReports> ShardFolder::read(const std::string& path) const {
 Result<ShardReports> ShardFolder::parse(std::string_view text) const {
   const std::string_view first = text.substr(0, text.find('\n'));
   text.remove_prefix(std::min(text.size(), first.size() + 1));
-  const Json header = Json::parse(first, nullptr, false);
+  const Json header = parse_json(first);
   if (header.at("schema") != kResultSchema || header.at("plan") != plan_->id ||
       header.at("shard") != shard_ || header.at("sha256") != text_sha256(text)) {
     return fail(ErrorCode::bad_data, "another result");
@@ -140,7 +141,7 @@ Result<ShardReports> ShardFolder::parse(std::string_view text) const {
   all.software = header.at("software");
   std::set<std::size_t> seen;
   for (const std::string_view line : lines_of(text)) {
-    const Json json = Json::parse(line, nullptr, false);
+    const Json json = parse_json(line);
     const auto index = integer_of<std::size_t>(json.at("file"));
     if (index >= manifest_.size() || !seen.insert(index).second) {
       return fail(ErrorCode::bad_data, "a file that is not in the shard");

@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "base/text/csv_field.h"
+#include "base/text/json_text.h"
 #include "db/records.h"
 
 namespace sixpoint::repair {
@@ -29,7 +30,7 @@ std::string units_of(const std::string& folder) { return folder + "/units.csv"; 
 Json manifest_in(FileSystem& files, const std::string& folder) {
   const auto bytes = read_file(files, json_of(folder), kLargestManifest);
   if (bytes) {
-    Json json = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+    Json json = parse_json(as_text(*bytes));
     if (json.is_object() && json.value("schema", Json()) == kSchema && json.contains("files") &&
         json["files"].is_array()) {
       return json;

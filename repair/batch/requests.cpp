@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text/json_text.h"
 #include "db/store.h"
 #include "repair/archive/output_lock.h"
 #include "repair/batch/jobs.h"
@@ -105,11 +106,11 @@ Result<std::optional<db::Store>> store_to_read(Env& env, const std::string& loca
 }  // namespace
 
 Status take_options(std::string_view json, ScanRequest& request) {
-  return take_parsed_options(Json::parse(json, nullptr, false), request);
+  return take_parsed_options(parse_json(json), request);
 }
 
 Status take_options(std::string_view json, RepairRequest& request) {
-  return take_parsed_options(Json::parse(json, nullptr, false), request);
+  return take_parsed_options(parse_json(json), request);
 }
 
 Status take_parsed_options(Json json, ScanRequest& request) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "calib/constants.h"
 #include "repair/rescale/applying_constants.h"
 
@@ -60,7 +61,7 @@ std::string ConstantsSnapshot::to_json_lines() const {
 Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
   ConstantsSnapshot snapshot;
   for (const std::string_view line : lines_of(text)) {
-    const Json json = Json::parse(line, nullptr, false);
+    const Json json = parse_json(line);
     const auto is_text = [&](const char* key) {
       return json.is_object() && json.contains(key) && json[key].is_string();
     };

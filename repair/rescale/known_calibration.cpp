@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
+
 namespace sixpoint::repair {
 namespace {
 
@@ -24,11 +26,11 @@ void add_date(const Json& from, const char* key, std::set<UtcTime>& dates) {
 KnownDate calibration_date(const db::UnitHistory& history) {
   std::set<UtcTime> of_repairs;
   for (const db::RepairRecord& repair : history.repairs) {
-    add_date(Json::parse(repair.document, nullptr, false), "calibration_time", of_repairs);
+    add_date(parse_json(repair.document), "calibration_time", of_repairs);
   }
   std::set<UtcTime> dates = of_repairs;
   for (const db::RunRecord& run : history.runs) {
-    const Json document = Json::parse(run.document, nullptr, false);
+    const Json document = parse_json(run.document);
     for (const char* page : {"as_found", "as_left"}) {
       if (document.is_object() && document.contains(page)) {
         add_date(document[page], "calibrated", dates);

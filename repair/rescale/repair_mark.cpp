@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "gt3x/recording.h"
 
 namespace sixpoint::repair {
@@ -99,7 +100,7 @@ std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
   if (!bytes) {
     return std::nullopt;
   }
-  auto mark = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  auto mark = parse_json(as_text(*bytes));
   return mark.is_object() ? std::optional(std::move(mark)) : std::nullopt;
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "gt3x/container/byte_source.h"
 #include "gt3x/forms/agdc.h"
 #include "gt3x/forms/clock.h"
@@ -20,8 +21,7 @@ bool is_repair_mark(const gt3x::Record& record) {
   if (!record.is(gt3x::RecordType::metadata)) {
     return false;
   }
-  const auto json = nlohmann::json::parse(record.payload.begin(), record.payload.end(), nullptr,
-                                          /*allow_exceptions=*/false);
+  const auto json = parse_json<nlohmann::json>(as_text(record.payload));
   return json.is_object() && json.value("MetadataType", nlohmann::json()) == kRepairMarkType;
 }
 

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "calib/direction_cells.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/gate.h"
@@ -90,7 +91,7 @@ std::string UnitAnswers::to_json_lines() const {
 Result<UnitAnswers> UnitAnswers::parse(std::string_view text) {
   UnitAnswers answers;
   for (const std::string_view line : lines_of(text)) {
-    const Json json = Json::parse(line, nullptr, false);
+    const Json json = parse_json(line);
     try {
       if (auto answer = answer_of(json)) {
         answers.set(json.at("serial").get<std::string>(), *std::move(answer));

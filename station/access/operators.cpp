@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 #include "station/access/secrets.h"
 
 namespace sixpoint::station {
@@ -58,7 +59,7 @@ Result<std::vector<Operators::Entry>> Operators::read() const {
   }
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(env_.files, path_, kMostFileBytes));
   try {
-    const Json json = Json::parse(bytes.begin(), bytes.end());
+    const Json json = parse_json(as_text(bytes));
     for (const Json& item : json.at("operators")) {
       SIXPOINT_ASSIGN(const OperatorRole role,
                       parse_operator_role(item.at("role").get<std::string>()));

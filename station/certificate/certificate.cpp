@@ -7,6 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "base/measure.h"
+#include "base/text/json_text.h"
 #include "gt3x/forms/model.h"
 #include "station/certificate/dcc.h"
 #include "station/run/jig_report.h"
@@ -163,7 +164,7 @@ std::string zpl_text(std::string_view text) {
 }  // namespace
 
 Result<Certificate> certificate_of(const db::RunRecord& run) {
-  const Json json = Json::parse(run.document, nullptr, false);
+  const Json json = parse_json(run.document);
   const Document document(json);
   const auto verdict = parse_jig_verdict(run.verdict);
   if ((run.kind != "jig" && run.kind != "write") || !verdict || *verdict == JigVerdict::stopped ||

@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "station/lanes/continue_rule.h"
 #include "station/run/jig_progress.h"
 
@@ -137,7 +138,7 @@ Result<std::optional<Unfinished>> read_state(FileSystem& files, const std::strin
   }
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kMostState_bytes));
   try {
-    SIXPOINT_ASSIGN(Unfinished work, parse(Json::parse(bytes, nullptr, false)));
+    SIXPOINT_ASSIGN(Unfinished work, parse(parse_json(as_text(bytes))));
     return work;
   } catch (const std::exception&) {
     return fail(ErrorCode::bad_data, "this is not the state of a run or capture", path,

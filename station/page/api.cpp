@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "station/lanes/scan_rule.h"
 #include "station/page/api_answers.h"
 #include "station/page/quality_control.h"
@@ -334,7 +335,7 @@ ApiAnswer Api::post(const ApiRequest& request) {
   }
   Json body = Json::object();
   if (!request.body.empty()) {
-    body = Json::parse(request.body, nullptr, false);
+    body = parse_json(request.body);
     if (body.is_discarded() || !body.is_object()) {
       return refusal(400, "bad_json", "the body is no JSON object");
     }

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "base/text/json_text.h"
 #include "station/certificate/certificate.h"
 #include "station/records/run_records.h"
 
@@ -170,7 +171,7 @@ Result<Json> QualityControl::runs(const std::string& from, const std::string& se
   for (const char* kind : {"jig", kWriteKind}) {
     filter.kind = kind;
     SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-      const Json document = Json::parse(run.document, nullptr, false);
+      const Json document = parse_json(run.document);
       const bool written = document.is_object() &&
                            document.value("/as_left/written"_json_pointer, Json(false)) == true;
       newest.push_front({{"run", run.id},
@@ -198,7 +199,7 @@ Result<Json> QualityControl::studies() {
   db::RunFilter filter;
   filter.kind = kStudyKind;
   SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-    const Json json = Json::parse(run.document, nullptr, false);
+    const Json json = parse_json(run.document);
     if (json.is_object() && json.contains("study") && json["study"].is_string()) {
       names.insert(json["study"].get<std::string>());
       for (const JudgedQuantity& quantity : summary_of(run).quantities) {

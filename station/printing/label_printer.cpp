@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/text/json_text.h"
 
 namespace sixpoint::station {
 
@@ -39,7 +40,7 @@ std::string text_of(const Entry& entry) {
 
 Result<Entry> read_entry(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kMostFile_bytes));
-  const Json json = Json::parse(bytes.begin(), bytes.end(), nullptr, false);
+  const Json json = parse_json(as_text(bytes));
   const auto has = [&](const char* key) { return json.contains(key) && json[key].is_string(); };
   if (!json.is_object() || !has("run") || !has("serial") || !has("state") || !has("zpl") ||
       !json.contains("added_ms") || !json["added_ms"].is_number_integer() ||

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "device/jig.h"
 
 namespace sixpoint::station {
@@ -275,7 +276,7 @@ Eigen::Matrix3d rotation_on_jig(device::Pose pose, bool half_turned) {
 
 Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv) {
   constexpr std::size_t kTemperatures = 2000;  // in the bundle, spread over the run
-  const Json report = Json::parse(run.document, nullptr, false);
+  const Json report = parse_json<Json>(run.document);
   if (!report.is_object() || !report.contains("poses")) {
     return fail(ErrorCode::bad_data, "the run's document is no jig report", run.id, kDamaged);
   }

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
 #include "device/jig.h"
 
 namespace sixpoint::station {
@@ -84,7 +85,7 @@ Result<RunReadings> readings_of_run(const StoredRun& run) {
   const auto wrong = [&](const char* what) {
     return fail(ErrorCode::bad_data, what, run.id, "leave this run out, or measure the unit again");
   };
-  const auto report = nlohmann::json::parse(run.document, nullptr, false);
+  const auto report = parse_json<nlohmann::json>(run.document);
   Placements placements;
   RunReadings out;
   if (!read_placements(report, placements)) {

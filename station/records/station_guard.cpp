@@ -7,6 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 #include "station/records/station_records.h"
 
 namespace sixpoint::station {
@@ -106,7 +107,7 @@ Result<StationMemory> StationGuard::memory() const {
     return bytes.error().code == ErrorCode::bad_data ? damaged() : fail(bytes.error());
   }
   try {
-    return parse_memory(Json::parse(*bytes, nullptr, false));
+    return parse_memory(parse_json(as_text(*bytes)));
   } catch (const std::exception&) {  // of nlohmann, and a value that is none
     return damaged();
   }

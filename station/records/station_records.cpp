@@ -10,6 +10,8 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/json_text.h"
+
 namespace sixpoint::station {
 
 namespace {
@@ -79,7 +81,7 @@ RunSummary summary_of(const db::RunRecord& run) {
   out.seconds = std::chrono::duration<double>(run.ended - run.started).count();
   out.verdict = parse_jig_verdict(run.verdict).value_or(JigVerdict::inconclusive);
   out.codes = run.codes;
-  const Json json = Json::parse(run.document, nullptr, false);
+  const Json json = parse_json(run.document);
   if (json.is_object() && json.contains("firmware") && json["firmware"].is_string()) {
     out.firmware = json["firmware"].get<std::string>();
   }
@@ -482,7 +484,7 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
   db::RunFilter filter;
   filter.kind = kStudyKind;
   SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-    const Json json = Json::parse(run.document, nullptr, false);
+    const Json json = parse_json(run.document);
     if (!json.is_object() || !json.contains("study") || json["study"] != study) {
       return {};
     }
