@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -84,7 +85,32 @@ std::string constants_text(const Json& constants) {
   return fmt::format("{} LSB/g, {} LSB", sensitivity, zero);
 }
 
-std::string bash_word(const std::string& word) {
+std::string without_password(const std::string& word) {
+  const std::size_t colon = std::min(word.find("://"), word.size());
+  const std::string_view scheme = std::string_view(word).substr(0, colon);
+  if (colon == word.size() || !(scheme.ends_with("postgresql") || scheme.ends_with("postgres"))) {
+    return word;
+  }
+  const std::size_t begin = colon + 3;
+  const std::size_t settings = std::min(word.find('?', begin), word.size());
+  std::string place = word.substr(begin, settings - begin);
+  const std::size_t host = place.rfind('@');
+  if (const std::size_t password = place.find(':'); host != std::string::npos && password < host) {
+    place.erase(password, host - password);
+  }
+  std::string kept = word.substr(0, begin) + place;
+  std::istringstream rest(word.substr(std::min(settings + 1, word.size())));
+  char before = '?';
+  for (std::string setting; std::getline(rest, setting, '&');) {
+    if (!setting.starts_with("password=") && !setting.starts_with("sslpassword=")) {
+      kept += std::exchange(before, '&') + setting;
+    }
+  }
+  return kept;
+}
+
+std::string bash_word(const std::string& given) {
+  const std::string word = without_password(given);
   if (printable(word) == word) {
     return repair::shell_word(word);
   }

@@ -40,9 +40,13 @@ class Columns {
 // `constants` as calib::to_json() writes them; empty where it is not that.
 std::string constants_text(const Json& constants);
 
-// One argument of a command line that people are told to give, as bash takes it: in quotes where it
-// needs them, and what a terminal does not show as \xNN.
-std::string bash_word(const std::string& word);
+// The address of a PostgreSQL store, also behind "--store=", without its password: what is printed or
+// written is read by others. Any other word as it is.
+std::string without_password(const std::string& word);
+
+// One argument of a command line that people are told to give, as bash takes it: without a password,
+// in quotes where it needs them, and what a terminal does not show as \xNN.
+std::string bash_word(const std::string& given);
 
 // The last line of a result: the command that people give next, on stderr. `words` are the command
 // and its arguments, each as bash_word() has it. Nothing with --json.

@@ -105,9 +105,7 @@ std::string journal_folder(const std::string& location) {
 }
 
 std::string catch_up_line(const std::string& location) {
-  const std::string file = store_file(location);
-  return std::string("sixpoint store catch-up") +
-         (location.empty() ? "" : " --store " + (file.empty() ? "STORE" : bash_word(location)));
+  return "sixpoint store catch-up" + (location.empty() ? "" : " --store " + bash_word(location));
 }
 
 std::vector<std::string> with_store(std::vector<std::string> words, const std::string& location) {
@@ -132,18 +130,22 @@ db::SavePlaces save_places(const std::string& location, LastResort last_resort) 
   if (last_resort == LastResort::none) {
     return places;
   }
-  const std::string name = "/sixpoint-journal-" + store_name(location);
-  places.last_resorts.push_back("." + name);
-  std::error_code error;
-  if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
-    places.last_resorts.push_back(folder.string() + name);
-  }
-  std::erase_if(places.last_resorts,
-                [](const std::string& folder) { return !is_nobody_elses(folder); });
+  places.last_resorts = last_resort_folders(location);
   return places;
 }
 
 }  // namespace
+
+std::vector<std::string> last_resort_folders(const std::string& location) {
+  const std::string name = "/sixpoint-journal-" + store_name(location);
+  std::vector<std::string> folders = {"." + name};
+  std::error_code error;
+  if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
+    folders.push_back(folder.string() + name);
+  }
+  std::erase_if(folders, [](const std::string& folder) { return !is_nobody_elses(folder); });
+  return folders;
+}
 
 Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id) {
   return db::Journal::holds(files, journal_folder(location), id);
@@ -168,7 +170,8 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   if (kept->last_resort) {
     context.worsen(ErrorCode::io);
     context.log().warn(
-        "nothing is lost: it is kept in {}; when there is space again, store it with '{} --journal "
+        "nothing is lost: it is kept in {}; when the store can be written again, store it with '{} "
+        "--journal "
         "{}'",
         kept->folder, catch_up_line(location), bash_word(kept->folder));
     return kept;
@@ -284,7 +287,7 @@ Result<db::Store> open_store(Context& context, const std::string& location) {
 
 void warn_without_store(Context& context, const Result<db::Store>& store) {
   if (!store) {
-    context.log().warn("the store cannot be used now: {}; what is measured is kept beside it",
+    context.log().warn("the store cannot be used now: {}; what is measured is kept in a journal",
                        store.error().brief());
   }
 }
@@ -307,7 +310,7 @@ Result<db::Store> open_existing_store(Context& context, const std::string& locat
     return fail(ErrorCode::bad_data, "this file is empty: it is no store", path,
                 "if it was one, keep the file and restore the last backup");
   }
-  auto store = db::Store::open(context.env, path);
+  auto store = db::Store::open_existing(context.env, path);
   if (store || store.error().code != ErrorCode::permission) {
     return store;
   }

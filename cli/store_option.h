@@ -67,8 +67,7 @@ std::string guard_folder(const std::string& location);
 // store, in journal/ of data_folder().
 std::string journal_folder(const std::string& location);
 
-// The command that stores what waits in that journal. A server's address is left out: it may hold a
-// password.
+// The command that stores what waits in that journal.
 std::string catch_up_line(const std::string& location);
 
 // For next_step(): the command's words, with --store where `location` was named.
@@ -79,6 +78,9 @@ std::vector<std::string> with_store(std::vector<std::string> words, const std::s
 // is none. The station takes none: its temporary folder ends with it, and it keeps the run in its
 // state folder and tries again.
 enum class LastResort : std::uint8_t { folders, none };
+
+// The folders of the last resorts of the store at `location`, in their order; each need not be there.
+std::vector<std::string> last_resort_folders(const std::string& location);
 
 // Calls `work` with the store, or with the journal where the store fails (db/save.h). `store` is
 // the result of open_store().

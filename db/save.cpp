@@ -53,8 +53,8 @@ Result<Saved> save(FileSystem& files, Result<Store>& store, const SavePlaces& pl
     if (kept) {
       saved.folder = folder;
       saved.last_resort = true;
-      saved.refusal->what += fmt::format("; nor does the journal, {}: {}", journalled.error().where,
-                                         journalled.error().what);
+      saved.refusal->what += fmt::format("; the journal {} cannot be written either: {}",
+                                         journalled.error().where, journalled.error().what);
       return saved;
     }
   }

@@ -45,11 +45,24 @@ bool is_postgres(const std::string& location) {
   return location.starts_with("postgresql://") || location.starts_with("postgres://");
 }
 
+Result<std::unique_ptr<Database>> open_database(const std::string& location) {
+  return is_postgres(location) ? open_postgres(location) : open_sqlite(location);
+}
+
 }  // namespace
 
 Result<Store> Store::open(Env& env, const std::string& location) {
-  SIXPOINT_ASSIGN(auto database,
-                  is_postgres(location) ? open_postgres(location) : open_sqlite(location));
+  SIXPOINT_ASSIGN(auto database, open_database(location));
+  return in(env, std::move(database));
+}
+
+Result<Store> Store::open_existing(Env& env, const std::string& location) {
+  SIXPOINT_ASSIGN(auto database, open_database(location));
+  SIXPOINT_ASSIGN(const std::int64_t version, database->schema_version());
+  if (version == 0) {
+    return fail(ErrorCode::no_input, "there is no store in this database", database->location(),
+                "name another one, or make one with 'sixpoint jig' or 'sixpoint solve --save'");
+  }
   return in(env, std::move(database));
 }
 
@@ -144,11 +157,12 @@ Result<std::string> Store::whole_key(std::string_view table_name, const std::str
   }
   std::vector<Row> rows;
   if (by_id && may_be_beginning_of_id(key)) {
-    // 'g' stands after every digit.
-    SIXPOINT_ASSIGN(rows, database_->query(
-                              fmt::format("SELECT {0} FROM {1} WHERE {0} > $1 AND {0} < $2 LIMIT 2",
-                                          table.columns[0].name, table.name),
-                              std::vector<Value>{key, key + "g"}));
+    // Not by order: in a Danish database "aa" stands behind "z".
+    SIXPOINT_ASSIGN(
+        rows,
+        database_->query(fmt::format("SELECT {0} FROM {1} WHERE substr({0}, 1, {2}) = $1 LIMIT 2",
+                                     table.columns[0].name, table.name, key.size()),
+                         std::vector<Value>{key}));
   }
   if (rows.size() == 1) {
     return text_of(rows[0][0]);

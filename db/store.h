@@ -34,6 +34,8 @@ class Store final : public RecordWriter {
   // `location`: a path of an SQLite file, which is made when it is not there, or postgresql://...
   // Errors as open_sqlite(), open_postgres() and migrate().
   static Result<Store> open(Env& env, const std::string& location);
+  // As open(), of a store that is there: of a database without one, no_input.
+  static Result<Store> open_existing(Env& env, const std::string& location);
   // Only to read, also where nothing may be written: a store of an earlier version is refused
   // (configuration), and so is a place where there is none (no_input).
   static Result<Store> open_to_read(Env& env, const std::string& location);

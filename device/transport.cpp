@@ -9,12 +9,17 @@ std::shared_ptr<Clock> borrow_clock(Clock& clock) {
   return {std::shared_ptr<void>(), &clock};  // owns nothing
 }
 
+tl::unexpected<Error> no_device(std::string_view address,
+                                const std::vector<std::string>& examples) {
+  return fail(ErrorCode::usage,
+              fmt::format("'{}' is no device this program can open", printable(address, 80)), {},
+              fmt::format("use one of: {}", fmt::join(examples, ", ")));
+}
+
 Result<Link> TransportRegistry::open(std::string_view address, Env& env) const {
   const auto found = openers_.find(address);
   if (!found) {
-    return fail(ErrorCode::usage,
-                fmt::format("'{}' is no device this program can open", printable(address, 80)), {},
-                fmt::format("use one of: {}", fmt::join(examples(), ", ")));
+    return no_device(address, examples());
   }
   Result<Link> link = found->opener(found->rest, env);
   if (link) {

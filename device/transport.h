@@ -59,6 +59,9 @@ struct Link {
 // Wraps a clock that outlives all links (the Env's) for Link::clock.
 std::shared_ptr<Clock> borrow_clock(Clock& clock);
 
+// What is said of an address that no registry knows.
+tl::unexpected<Error> no_device(std::string_view address, const std::vector<std::string>& examples);
+
 class TransportRegistry {
  public:
   using Opener = std::function<Result<Link>(std::string_view rest, Env& env)>;
@@ -71,6 +74,7 @@ class TransportRegistry {
   // permission or no_input when it cannot be reached. `env` outlives the link.
   Result<Link> open(std::string_view address, Env& env) const;
   std::vector<std::string> examples() const { return openers_.examples(); }
+  bool knows(std::string_view address) const { return openers_.find(address).has_value(); }
 
  private:
   SchemeTable<Opener> openers_;

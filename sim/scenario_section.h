@@ -32,7 +32,8 @@ namespace sixpoint::sim {
 using Json = nlohmann::json;
 
 inline tl::unexpected<Error> wrong(const std::string& path, std::string what) {
-  return fail(ErrorCode::configuration, std::move(what), "scenario: " + printable(path, 100),
+  return fail(ErrorCode::configuration, std::move(what),
+              path.empty() ? "scenario" : "scenario: " + printable(path, 100),
               "docs/scenario.md describes every key");
 }
 

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "db/journal.h"
 #include "device/usb/discovery.h"
@@ -87,19 +88,26 @@ Check check_store(const DoctorCommandOptions& options, Context& context) {
 
 // Are there measurements that the store did not take yet?
 Check check_journal(const DoctorCommandOptions& options, Context& context) {
-  const std::string folder = journal_folder(options.store);
-  if (!context.env.files.info(folder)) {
-    return {"journal", true, "nothing waits for the store"};
+  const std::string own = journal_folder(options.store);
+  std::vector<std::string> folders = last_resort_folders(options.store);
+  folders.insert(folders.begin(), own);
+  for (const std::string& folder : folders) {
+    if (!context.env.files.info(folder)) {
+      continue;
+    }
+    auto journal = db::Journal::open(context.env.files, folder);
+    const auto pending = journal ? journal->pending() : Result<std::size_t>(fail(journal.error()));
+    if (!pending) {
+      return {"journal", false, pending.error().brief()};
+    }
+    if (*pending > 0) {
+      return {"journal", false,
+              fmt::format("{} entries wait in {}: run '{}{}'", *pending, folder,
+                          catch_up_line(options.store),
+                          folder == own ? "" : " --journal " + bash_word(folder))};
+    }
   }
-  auto journal = db::Journal::open(context.env.files, folder);
-  const auto pending = journal ? journal->pending() : Result<std::size_t>(fail(journal.error()));
-  if (!pending) {
-    return {"journal", false, pending.error().brief()};
-  }
-  return {"journal", *pending == 0,
-          *pending == 0 ? std::string("nothing waits for the store")
-                        : fmt::format("{} entries wait in {}: run '{}'", *pending, folder,
-                                      catch_up_line(options.store))};
+  return {"journal", true, "nothing waits for the store"};
 }
 
 Check check_disk(const std::string& folder) {

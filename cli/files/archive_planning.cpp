@@ -59,8 +59,8 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
   draft.repair.store_named = !sources.store.empty();
   SIXPOINT_ASSIGN(auto store, store_of(context, sources));
   if (store) {
-    const std::string place = store->database().location();
-    draft.store = place.find("://") == std::string::npos ? absolute(place) : place;
+    const std::string place = sources.store.empty() ? default_store() : sources.store;
+    draft.store = store_file(place).empty() ? without_password(place) : absolute(place);
     const auto order = order_of(sources, true);
     if (std::ranges::find(order, repair::SourceKind::store) != order.end()) {
       SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));

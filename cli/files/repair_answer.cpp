@@ -19,10 +19,9 @@ void add_source_options(CLI::App& command, RepairSources& sources) {
                      "use these constants (constants.json), and no others");
   command.add_option("--calibration-file", sources.calibration_file,
                      "use a recording of the unit lying still on each of its six sides");
-  command.add_flag("--scan", sources.scan, "use the still periods of the file itself");
+  command.add_flag("--scan", sources.scan, "use the still periods of the unit's files");
   add_store_option(command, sources.store);
-  command.add_flag("--or-scan", sources.or_scan,
-                   "the still periods of the file itself where what is named does not fit");
+  command.add_flag("--or-scan", sources.or_scan, "still periods where what is named does not fit");
   command.add_flag("--no-pool", sources.no_pool,
                    "never use the still periods of the unit's other files");
 }

@@ -1,5 +1,7 @@
 #include "cli/gap/challenge_scores.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -172,7 +174,8 @@ std::vector<std::pair<std::string, std::string>> scores_lines(const Scores& scor
           {"  ... where this protocol can show it", text_of(scores.first_observable)},
           {"  ... and at least of typical size", text_of(scores.first_large)},
           {"  ... right family", text_of(scores.family)},
-          {"two effects: F1 of the set", fmt::format("{:.3f}", scores.f1())},
+          {"two effects: F1 of the set",
+           std::isnan(scores.f1()) ? "-" : fmt::format("{:.3f}", scores.f1())},
           {"nothing missing: alarms", text_of(scores.alarms)},
           {"realistic: dominant effect first", text_of(scores.dominant)},
           {"  ... effects named (recall)", text_of(scores.recall)},

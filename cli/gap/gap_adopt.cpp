@@ -111,10 +111,13 @@ void print_gap_adopt(const gap::AdoptedScenario& learnt, const GapAdoptCommandOp
     context.text() << fmt::format("{:<20} {:<10} {}\n", printable(effect.decision.name, 60),
                                   gap::to_string(effect.change), effect.decision.brief());
     for (const gap::AdoptedNumber& parameter : effect.decision.parameters) {
-      for (const gap::MeanAndSpread& n : parameter.numbers) {
+      const bool per_axis = parameter.numbers.size() == 3;
+      for (std::size_t i = 0; i < parameter.numbers.size(); ++i) {
+        const gap::MeanAndSpread& n = parameter.numbers[i];
         const bool known = n.standard_uncertainty > 0;
         context.text() << fmt::format(
-            "  {:<22} {:>10.4g} {:<12} spread {} ({} units)\n", parameter.parameter, n.mean,
+            "  {:<24} {:>10.4g} {:<12} spread {} ({} units)\n",
+            parameter.parameter + (per_axis ? fmt::format(" {}", "xyz"[i]) : ""), n.mean,
             known ? fmt::format("+- {:.2g}", n.standard_uncertainty) : "(not shown)",
             n.spread ? fmt::format("{:.3g}", *n.spread) : "not known", n.units);
       }

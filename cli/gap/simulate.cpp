@@ -60,7 +60,13 @@ Result<Json> simulate(Context& context, const SimulateCommandOptions& options) {
   FileSystem& files = outputs.files();
   SIXPOINT_CHECK(outputs.input(options.scenario));
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
-  SIXPOINT_ASSIGN(const sim::Scenario scenario, sim::parse_scenario(as_text(text)));
+  auto parsed = sim::parse_scenario(as_text(text));
+  if (!parsed) {
+    Error error = std::move(parsed).error();
+    error.where = printable(options.scenario) + ": " + error.where;
+    return fail(std::move(error));
+  }
+  const sim::Scenario& scenario = *parsed;
   if (scenario.protocol) {
     return simulate_bundle(options, scenario, outputs);
   }

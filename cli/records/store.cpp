@@ -1,4 +1,5 @@
 // sixpoint store: moving, saving and asking the whole store.
+#include <algorithm>
 #include <cstdlib>
 
 #include <fmt/format.h>
@@ -96,10 +97,14 @@ Result<Answer> catch_up(const StoreCommandOptions& options, Context& context) {
     SIXPOINT_CHECK(context.env.files.info(folder));
   }
   // The journal may be all that there is of a store: the one that it waits for is made. Not where
-  // both are named, since one name may be wrong.
+  // both are named and the folder's name is another store's, since one name may be wrong.
   const bool waits = context.env.files.info(folder).has_value();
-  SIXPOINT_ASSIGN(auto store, waits&& options.journal.empty() ? open_store(context, options.store)
-                                                              : open_to_add(options, context));
+  const std::string name = file_name_of(folder.substr(0, folder.find_last_not_of('/') + 1));
+  const auto is_folder = [&](const std::string& resort) { return file_name_of(resort) == name; };
+  const bool is_of_store =
+      options.journal.empty() || std::ranges::any_of(last_resort_folders(options.store), is_folder);
+  SIXPOINT_ASSIGN(auto store, waits&& is_of_store ? open_store(context, options.store)
+                                                  : open_to_add(options, context));
   std::size_t taken = 0;
   if (waits) {
     SIXPOINT_ASSIGN(auto journal, db::Journal::open(context.env.files, folder));

@@ -19,7 +19,7 @@ namespace {
 
 struct OperatorCommandOptions {
   std::string name;
-  std::string role = "technician";
+  std::string role;  // empty: as before; technician where the operator is new
   bool json = false;
 };
 
@@ -86,16 +86,20 @@ std::string read_pin(Context& context, const std::string& whose) {
 }
 
 Status add(const OperatorCommandOptions& options, Context& context) {
-  SIXPOINT_ASSIGN(const auto role, station::parse_operator_role(options.role));
+  std::optional<station::OperatorRole> role;
+  if (!options.role.empty()) {
+    SIXPOINT_ASSIGN(role, station::parse_operator_role(options.role));
+  }
   station::Operators operators(context.env, operators_file());
-  SIXPOINT_CHECK(operators.add(options.name, role, read_pin(context, options.name)));
+  SIXPOINT_ASSIGN(const auto has,
+                  operators.add(options.name, role, read_pin(context, options.name)));
   Json json = document("operator");
   json["name"] = options.name;
-  json["role"] = options.role;
+  json["role"] = to_string(has);
   return print_answer(
       context, options.json, json,
       fmt::format("{} is {} {} now\n", printable(options.name),
-                  role == station::OperatorRole::engineer ? "an" : "a", options.role));
+                  has == station::OperatorRole::engineer ? "an" : "a", to_string(has)));
 }
 
 Status disable(const OperatorCommandOptions& options, Context& context) {
@@ -171,8 +175,9 @@ void add_operator(CLI::App& app, Context& context) {
   };
   auto added =
       named("add", "a new operator, or a new role and PIN; the PIN is read from stdin", add);
-  added.command.add_option("--role", added.options.role, "technician, or engineer: signs too")
-      ->capture_default_str();
+  added.command.add_option("--role", added.options.role,
+                           "technician, or engineer: signs too (default: as before; technician "
+                           "for a new one)");
   named("disable", "this operator may not sign in any more", disable);
   add_command<OperatorCommandOptions>(group, context, "operator", "list", "names and roles", list);
 }

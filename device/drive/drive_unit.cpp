@@ -60,7 +60,7 @@ Result<std::unique_ptr<Unit>> DriveUnit::open(std::string folder, Env& env) {
   }
   const auto info = env.files.info(folder);
   if (!info || !info->is_folder) {
-    return fail(ErrorCode::no_input, "there is no such folder", folder,
+    return fail(ErrorCode::no_input, "there is no such folder", folder.empty() ? "drive:" : folder,
                 "name the folder where the unit is mounted");
   }
   std::unique_ptr<DriveUnit> unit(new DriveUnit(std::move(folder), env));
@@ -71,8 +71,10 @@ Result<std::unique_ptr<Unit>> DriveUnit::open(std::string folder, Env& env) {
 Result<Identity> DriveUnit::read_identity() const {
   for (const char* name : {kInfoName, kLogName}) {
     if (!env_.files.info(path_of(name))) {
-      return fail(ErrorCode::bad_data, fmt::format("this folder holds no {}", name), folder_,
-                  "a unit's folder holds info.txt and log.bin; is it mounted?");
+      return fail(
+          ErrorCode::bad_data, fmt::format("this folder holds no {}", name), folder_,
+          "a unit's folder holds info.txt and log.bin: is it mounted? A .gt3x file needs no "
+          "unit: 'sixpoint solve FILE'");
     }
   }
   SIXPOINT_ASSIGN(const Bytes text, read_file(env_.files, path_of(kInfoName), kMostInfo_bytes));

@@ -169,14 +169,13 @@ Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock) 
                       ? std::string("no such device is plugged in")
                       : fmt::format("no device with the serial number {} is plugged in",
                                     printable(filter.serial, 80)),
-                  fmt::format("{:04x}:*", filter.vendor_id),
+                  "USB",
                   others.empty() ? "plug it in; 'sixpoint devices' lists what is there"
                                  : fmt::format("plug it in, or use one of: {}", names(others)));
     }
     if (found.size() > 1) {
       if (filter.serial.empty()) {
-        return fail(ErrorCode::usage, "several devices are plugged in",
-                    fmt::format("{:04x}:*", filter.vendor_id),
+        return fail(ErrorCode::usage, "several devices are plugged in", "USB",
                     fmt::format("name one by its serial number: {}", names(found)));
       }
       return fail(

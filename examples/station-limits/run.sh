@@ -2,7 +2,7 @@
 # Measures a unit by limits of this station, and prints its label.
 #   run.sh DEVICE PRINTER_HOST PRINTER_PORT        for example: run.sh virtual:seed=7,jig=auto label-printer 9100
 set -euo pipefail
-device=$1 printer=$2 port=$3
+device=${1:?'usage: run.sh DEVICE PRINTER_HOST PRINTER_PORT'} printer=${2:?} port=${3:?}
 program=${SIXPOINT_PROGRAM:-sixpoint}
 
 # Once for a station: the built-in limits, with one that is tighter.
@@ -12,7 +12,9 @@ if [ ! -e limits.toml ]; then
 fi
 "$program" limits check limits.toml
 
-# For each unit. The label is made only when what the unit holds was read back and passed.
-"$program" jig --device "$device" --limits limits.toml --store station.db --station bench-3 --write --label label.zpl
-cat label.zpl >"/dev/tcp/$printer/$port"
-rm label.zpl
+# For each unit. The label is made only when what the unit holds was read back and passed. It is in a folder of its own: one
+# that could not be printed is not in the way of the next.
+labels=$(mktemp -d)
+trap 'rm -rf "$labels"' EXIT
+"$program" jig --device "$device" --limits limits.toml --store station.db --station bench-3 --write --label "$labels/label.zpl"
+cat "$labels/label.zpl" >"/dev/tcp/$printer/$port"

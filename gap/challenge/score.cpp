@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sixpoint::gap {
 namespace {
@@ -192,7 +193,8 @@ std::array<double, 2> Share::interval() const {
 }
 
 double Scores::f1() const {
-  return pair_named + pair_truth == 0 ? 0 : 2 * pair_hits / (pair_named + pair_truth);
+  return pair_named + pair_truth == 0 ? std::numeric_limits<double>::quiet_NaN()
+                                      : 2 * pair_hits / (pair_named + pair_truth);
 }
 
 double Scores::calibration_error() const { return expected_error(bins); }

@@ -102,7 +102,7 @@ struct Scores {
   std::array<Bin, 10> unknown_bins;
   double seconds_sum = 0, seconds_max = 0;
 
-  double f1() const;
+  double f1() const;                 // not a number without a trial of two effects
   double calibration_error() const;  // expected, over the bins
   double unknown_calibration_error() const;
 };

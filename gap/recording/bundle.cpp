@@ -154,6 +154,10 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder) {
   Bundle bundle;
   bundle.path = folder;
   const std::string protocol = folder + "/protocol.json";
+  if (!files.info(protocol)) {
+    return fail(ErrorCode::no_input, "this folder is no bundle: it has no protocol.json", folder,
+                "name a bundle's folder or a .gt3x file; 'sixpoint simulate' makes bundles");
+  }
   SIXPOINT_CHECK(read_protocol(files, protocol, bundle));
   HeaderClaims claims;
   SIXPOINT_CHECK(read_recording(files, folder + "/recording.gt3x", bundle, claims));

@@ -91,16 +91,21 @@ exit "$status"
 std::string shell_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
 # Repairs this plan's files on this machine, without Slurm:  bash run_all.sh OUTDIR
-# and merges the results. JOBS says how many shards at a time (default: one per core). Ends with merge's exit code.
+# and merges the results. JOBS says how many shards at a time (default: one per core). Ends with merge's exit code, and with 2
+# at least where a shard was refused: what is merged is then what was there before.
 set -euo pipefail
 plan={0}
 program=${{SIXPOINT:-{1}}}
 output=${{1:?'usage: bash run_all.sh OUTDIR'}}
 # A shard that fails stops no other one: merge names it.
+not_run=0
 seq 0 {2} | xargs -P "${{JOBS:-$(nproc)}}" -n 1 \
-  sh -c '"$1" archive run "$2" --shard "$4" -o "$3" >/dev/null || true' _ \
-  "$program" "$plan" "$output"
-exec "$program" archive merge "$plan"
+  sh -c '"$1" archive run "$2" --shard "$4" -o "$3" >/dev/null || [ "$?" -lt 64 ]' _ \
+  "$program" "$plan" "$output" || not_run=2
+status=0
+"$program" archive merge "$plan" || status=$?
+[ "$status" -ge "$not_run" ] || status=$not_run
+exit "$status"
 )",
                      shell_word(scripts.folder), shell_word(scripts.program), scripts.shards - 1);
 }

@@ -75,7 +75,15 @@ Result<std::vector<Operators::Entry>> Operators::read() const {
   return entries;
 }
 
-Status Operators::write(const std::vector<Entry>& entries) const {
+Status Operators::replace(const std::vector<Entry>& before,
+                          const std::vector<Entry>& entries) const {
+  const auto is_engineer = [](const Entry& entry) {
+    return entry.is.role == OperatorRole::engineer;
+  };
+  if (std::ranges::any_of(before, is_engineer) && std::ranges::none_of(entries, is_engineer)) {
+    return fail(ErrorCode::configuration, "this is the last engineer: nobody could sign any more",
+                {}, "add another engineer first: 'sixpoint operator add NAME --role engineer'");
+  }
   Json json;
   json["schema"] = "sixpoint/operators/1";
   json["operators"] = Json::array();
@@ -100,7 +108,8 @@ Result<std::vector<Operator>> Operators::list() const {
   return operators;
 }
 
-Status Operators::add(const std::string& name, OperatorRole role, const std::string& pin) {
+Result<OperatorRole> Operators::add(const std::string& name, std::optional<OperatorRole> role,
+                                    const std::string& pin) {
   if (name.empty() || name.size() > kMostNameBytes || printable(name) != name ||
       name.front() == ' ' || name.back() == ' ' || has_hidden_characters(name)) {
     return fail(
@@ -114,15 +123,26 @@ Status Operators::add(const std::string& name, OperatorRole role, const std::str
       pin.find_first_not_of("0123456789") != std::string::npos) {
     return fail(ErrorCode::usage, "a PIN is 4 to 12 digits", {}, "choose another one");
   }
-  SIXPOINT_ASSIGN(auto entries, read());
-  std::erase_if(entries, [&](const Entry& entry) { return entry.is.name == name; });
+  SIXPOINT_ASSIGN(const auto before, read());
+  std::vector<Entry> entries;
+  OperatorRole has = OperatorRole::technician;
+  for (const Entry& entry : before) {
+    if (entry.is.name == name) {
+      has = entry.is.role;
+    } else {
+      entries.push_back(entry);
+    }
+  }
+  has = role.value_or(has);
   const std::string salt = random_hex(16);
-  entries.push_back({{name, role}, salt, pin_hash(pin, salt)});
-  return write(entries);
+  entries.push_back({{name, has}, salt, pin_hash(pin, salt)});
+  SIXPOINT_CHECK(replace(before, entries));
+  return has;
 }
 
 Status Operators::disable(const std::string& name) {
-  SIXPOINT_ASSIGN(auto entries, read());
+  SIXPOINT_ASSIGN(const auto before, read());
+  auto entries = before;
   if (std::erase_if(entries, [&](const Entry& entry) { return entry.is.name == name; }) == 0) {
     return fail(ErrorCode::no_input, "there is no operator of this name", printable(name, 80),
                 "'sixpoint operator list' names them");
@@ -134,7 +154,7 @@ Status Operators::disable(const std::string& name) {
         printable(name, 80),
         fmt::format("add another one first; to work without operators remove {}", path_));
   }
-  return write(entries);
+  return replace(before, entries);
 }
 
 Result<Operator> Operators::sign_in(const std::string& where, const std::string& name,

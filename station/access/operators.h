@@ -73,12 +73,14 @@ class Operators {
   Operators(Env& env, std::string path) : env_(env), path_(std::move(path)) {}
 
   Result<std::vector<Operator>> list() const;  // empty where there is no file
-  // A new operator, or a new role and PIN for this name. usage where the name is empty, over 60
-  // bytes or looks like another one (blanks at its ends, characters that are not seen), or the PIN
-  // is not 4 to 12 digits.
-  Status add(const std::string& name, OperatorRole role, const std::string& pin);
-  // no_input where there is none; configuration for the last one: a machine without operators takes
-  // names as they are typed.
+  // A new operator, or a new PIN, and role where one is given, for this name; who is new without a
+  // role is a technician. usage where the name is empty, over 60 bytes or looks like another one
+  // (blanks at its ends, characters that are not seen), or the PIN is not 4 to 12 digits;
+  // configuration where no engineer would be left. The role that the operator has then.
+  Result<OperatorRole> add(const std::string& name, std::optional<OperatorRole> role,
+                           const std::string& pin);
+  // no_input where there is none; configuration for the last one, since a machine without operators
+  // takes names as they are typed, and for the last engineer.
   Status disable(const std::string& name);
 
   // `where`: a browser's session, or any other name of a place.
@@ -101,7 +103,8 @@ class Operators {
   };
   static bool is_listed(const std::vector<Entry>& entries, const Operator& who);
   Result<std::vector<Entry>> read() const;
-  Status write(const std::vector<Entry>& entries) const;
+  // configuration where there was an engineer in `before`, and none is left.
+  Status replace(const std::vector<Entry>& before, const std::vector<Entry>& entries) const;
   void forget_idle();  // with mutex_ held
 
   Env& env_;

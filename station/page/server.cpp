@@ -382,8 +382,14 @@ class Server::Impl::Connection : public Idle,
 Status Server::Impl::listen() {
   NetworkError error;
   tcp::resolver resolver(io);
-  for (const auto& found : resolver.resolve(options.bind, std::to_string(options.port),
-                                            tcp::resolver::passive, error)) {
+  const auto all =
+      resolver.resolve(options.bind, std::to_string(options.port), tcp::resolver::passive, error);
+  if (error) {
+    return fail(ErrorCode::device_unavailable,
+                "this machine finds no address of that name: " + error.message(),
+                "--bind " + printable(options.bind, 80), "name an address of this machine");
+  }
+  for (const auto& found : all) {
     try {
       acceptor = tcp::acceptor(io, found.endpoint());
       return {};

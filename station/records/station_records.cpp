@@ -391,19 +391,21 @@ Result<RetestState> unit_retest_state(db::Store& store, const std::string& seria
 }
 
 Error station_is_locked(const std::string& why, const std::string& station) {
-  return {ErrorCode::configuration,
-          why,
-          {},
-          fmt::format("measure a check unit again, and a known-bad unit, which must fail; where a "
-                      "check unit was out of control an engineer then signs, on the page or by: "
-                      "sixpoint station-lock sign --station '{}' --operator NAME --reason WHY",
-                      printable(station, 60))};
+  return {
+      ErrorCode::configuration,
+      why,
+      {},
+      fmt::format("measure a check unit again, and a known-bad unit, which must fail; where a "
+                  "check unit was out of control an engineer then signs, on the page or by: "
+                  "sixpoint station-lock sign --station '{}' --operator NAME --reason WHY, with "
+                  "the same --store",
+                  printable(station, 60))};
 }
 
 Error unit_needs_release(const RetestState& state, const std::string& serial) {
   return {ErrorCode::configuration, state.reason, printable(serial, 60),
           fmt::format("an engineer checks it; then: sixpoint retest {} --release --operator NAME "
-                      "--reason WHY",
+                      "--reason WHY, with the same --store",
                       printable(serial, 60))};
 }
 

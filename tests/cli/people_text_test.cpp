@@ -72,6 +72,28 @@ TEST(ConstantsText, IsOneLineAndEmptyForAnythingElse) {
   EXPECT_EQ(constants_text("text"), "");
 }
 
+TEST(WithoutPassword, LeavesAllButThePasswords) {
+  const std::vector<std::pair<std::string, std::string>> rows = {
+      {"postgresql://ada:s3cret@host:5432/plant", "postgresql://ada@host:5432/plant"},
+      {"postgres://ada:s3:cr@et@host/plant", "postgres://ada@host/plant"},
+      {"--store=postgresql://ada:s3cret@/plant", "--store=postgresql://ada@/plant"},
+      {"postgresql://host:5432/plant", "postgresql://host:5432/plant"},
+      {"postgresql://ada@host/plant?options=-csearch_path%3Dlab&sslmode=verify-full",
+       "postgresql://ada@host/plant?options=-csearch_path%3Dlab&sslmode=verify-full"},
+      {"postgresql:///plant?password=s3cret&host=/run/pg&sslpassword=s3cret",
+       "postgresql:///plant?host=/run/pg"},
+      {"postgresql:///plant?host=h&password=s3cret&port=1", "postgresql:///plant?host=h&port=1"},
+      {"postgresql:///plant?password=s3cret", "postgresql:///plant"},
+      {"https://ada:word@host", "https://ada:word@host"},  // no store
+      {"a:b@c.gt3x", "a:b@c.gt3x"},
+      {"", ""},
+  };
+  for (const auto& [given, left] : rows) {
+    EXPECT_EQ(without_password(given), left);
+    EXPECT_THAT(bash_word(given), testing::Not(testing::HasSubstr("s3cret")));
+  }
+}
+
 TEST(NextStep, IsOneLineThatAShellTakes) {
   std::ostringstream out;
   std::ostringstream people;

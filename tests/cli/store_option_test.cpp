@@ -246,12 +246,15 @@ TEST_F(RefusingStore, WithoutAJournalsFolderTheWorkingFolderTakesIt) {
   const std::string folder = answer.json()["kept"]["folder"];
   EXPECT_THAT(folder, testing::StartsWith("./sixpoint-journal-"));
   EXPECT_THAT(answer.people, HasSubstr("--journal " + folder));
+  const auto doctor = run({"doctor", "--store", "none/store.db"});
+  EXPECT_THAT(doctor.out, HasSubstr("wait in " + folder)) << doctor.people;
+  EXPECT_THAT(doctor.out, HasSubstr("--journal " + folder));
   std::filesystem::create_directory("none");
-  const auto in_place = jig("none/store.db");  // makes the store
-  EXPECT_EQ(in_place.exit_code, 0) << in_place.people;
-  EXPECT_EQ(run({"store", "catch-up", "--journal", folder, "--store", "none/store.db", "--json"})
-                .json()["taken"],
-            2);
+  const auto catch_up = [&](const std::string& store) {
+    return run({"store", "catch-up", "--journal", folder, "--store", store, "--json"});
+  };
+  EXPECT_EQ(catch_up("none/stoer.db").exit_code, 66) << "another store's folder: none is made";
+  EXPECT_EQ(catch_up("none/store.db").json()["taken"], 2) << "it is made";
   EXPECT_EQ(
       run({"store", "catch-up", "--journal", "no-folder", "--store", "none/store.db"}).exit_code,
       66);

@@ -40,6 +40,7 @@ TEST_F(Workers, NamedFilesKeepTheOrderInWhichTheyWereNamed) {
       << "a file that is named twice is taken once";
   EXPECT_EQ(found[1].error->code, ErrorCode::no_input);
   EXPECT_NE(people_.str().find("empty: no .gt3x file below this folder"), std::string::npos);
+  EXPECT_EQ(context_.exit_code, static_cast<int>(ErrorCode::no_input)) << "of the empty folder";
 }
 
 TEST_F(Workers, EveryFileIsAnsweredOnceAndInOrder) {

@@ -38,6 +38,7 @@ TEST(UnitRegistry, AnUnknownSchemeIsRefusedWithTheExamples) {
     const auto unit = units.open(address, memory.env);
     EXPECT_FAILS(unit, ErrorCode::usage);
     EXPECT_THAT(unit.error().hint, HasSubstr("virtual:seed=7"));
+    EXPECT_THAT(unit.error().hint, HasSubstr("other:PORT"));
   }
   EXPECT_EQ(units.open("other:a:b", memory.env).error().what, "opened a:b");
 }

@@ -143,7 +143,8 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
   for (const auto& row : rows) {
     const auto scenario = parse_scenario(row.json);
     EXPECT_FAILS(scenario, ErrorCode::configuration);
-    EXPECT_EQ(scenario.error().where, std::string("scenario: ") + row.path) << row.json;
+    const std::string path = row.path;
+    EXPECT_EQ(scenario.error().where, path.empty() ? "scenario" : "scenario: " + path) << row.json;
     EXPECT_THAT(scenario.error().hint, HasSubstr("docs/scenario.md"));
   }
 }

@@ -210,10 +210,14 @@ TEST_F(ArchiveCommand, ThePlainScriptRunsAllAndMerges) {
   fill();
   std::filesystem::remove(archive_ + "/sub/broken.gt3x");
   ASSERT_EQ(plan({"--shards", "3"}).exit_code, 0);
-  const std::string line = "env SIXPOINT=" SIXPOINT_PROGRAM " JOBS=2 bash " + plan_ +
-                           "/run_all.sh " + out_ + " >/dev/null 2>&1";
-  const int status = std::system(line.c_str());
-  EXPECT_EQ(WEXITSTATUS(status), 1) << "one file cannot be repaired";
+  const auto run_all = [&](const std::string& output) {
+    const std::string line = "env SIXPOINT=" SIXPOINT_PROGRAM " JOBS=2 bash " + plan_ +
+                             "/run_all.sh " + output + " >/dev/null 2>&1";
+    const int status = std::system(line.c_str());
+    return WEXITSTATUS(status);
+  };
+  EXPECT_EQ(run_all(out_), 1) << "one file cannot be repaired";
+  EXPECT_EQ(run_all(folder_ / "other"), 2) << "the plan is repaired into another folder: refused";
   EXPECT_EQ(merge().json()["complete"], true);
   EXPECT_THAT(next_of(run({"archive", "merge", plan_})),
               testing::ElementsAre("archive", "report", plan_, "-o", "report.html"));

@@ -210,6 +210,45 @@ TEST_F(PostgresStoreTest, OpensOnlyStores) {
   EXPECT_FAILS(Store::open(memory_.env, newer), ErrorCode::configuration);
 }
 
+TEST_F(PostgresStoreTest, AQuestionMakesNoStore) {
+  const std::string empty = place_->location("empty");
+  const auto asked = Store::open_existing(memory_.env, empty);
+  EXPECT_FAILS(asked, ErrorCode::no_input);
+  auto database = open_postgres(empty);
+  ASSERT_OK(database);
+  EXPECT_EQ((*database)->schema_version().value(), 0);
+  { ASSERT_OK(Store::open(memory_.env, empty)); }
+  EXPECT_OK(Store::open_existing(memory_.env, empty));
+}
+
+// Where "aa" stands behind "z". Oracle: the order of the server, asked here.
+TEST_F(PostgresStoreTest, AnIdIsFoundByItsBeginningInEveryOrderOfLetters) {
+  location();
+  ASSERT_TRUE(place_->statements(
+      "main",
+      "CREATE DATABASE danish TEMPLATE template0 ENCODING 'UTF8' LOCALE_PROVIDER icu ICU_LOCALE "
+      "'da-DK'"));
+  const std::string danish = server().location("danish");
+  {
+    auto store = Store::open(memory_.env, danish);
+    ASSERT_OK(store);
+    const auto order = store->database().query("SELECT 1 WHERE 'aa' > 'z'", {});
+    ASSERT_OK(order);
+    ASSERT_EQ(order->size(), 1U) << "the database has another order";
+    int found = 0;
+    for (int number = 0; number < 400; ++number) {
+      const auto id = store->add_constants(constants(number), "w");
+      ASSERT_OK(id);
+      if (id->substr(7, 2) == "aa" || id->substr(8, 2) == "aa") {
+        EXPECT_EQ(store->whole_key("constants", id->substr(0, 9)).value(), *id);
+        ++found;
+      }
+    }
+    EXPECT_GT(found, 0) << "no id has it at the cut";
+  }
+  EXPECT_TRUE(place_->statements("main", "DROP DATABASE danish"));
+}
+
 TEST_F(PostgresStoreTest, ARefusalByRightsIsNamedSo) {
   { ASSERT_OK(Store::open(memory_.env, location())); }
   place_->tamper("main", "REVOKE INSERT ON units FROM station");

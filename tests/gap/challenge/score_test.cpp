@@ -51,6 +51,7 @@ TEST(Score, PairsByTheirF1) {
                                outcome(TrialKind::pair, truth, {{"tilt", 1}, {"jitter", 1}})},
                               false);
   EXPECT_NEAR(scores.f1(), 0.75, 1e-15);
+  EXPECT_TRUE(std::isnan(Scores{}.f1())) << "no trial of two effects";
 }
 
 TEST(Score, CalibrationByHand) {

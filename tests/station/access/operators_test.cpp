@@ -114,11 +114,22 @@ TEST_F(OperatorsTest, ATypedNameHasOneLine) {
 // Without one the machine would ask nobody for a PIN, Ada included.
 TEST_F(OperatorsTest, TheLastOneStays) {
   add_both();
-  EXPECT_OK(operators_.disable("Eve"));
-  const auto refused = operators_.disable("Ada");
+  EXPECT_OK(operators_.disable("Ada"));
+  const auto refused = operators_.disable("Eve");
   EXPECT_FAILS(refused, ErrorCode::configuration);
   EXPECT_THAT(refused.error().hint, testing::HasSubstr(kFile));
   EXPECT_EQ(operators_.list()->size(), 1U);
+}
+
+TEST_F(OperatorsTest, ANewPinKeepsTheRoleAndTheLastEngineerStays) {
+  add_both();
+  EXPECT_EQ(operators_.add("Eve", std::nullopt, "1357").value(), OperatorRole::engineer);
+  EXPECT_EQ(operators_.add("Bo", std::nullopt, "1357").value(), OperatorRole::technician);
+  EXPECT_FAILS(operators_.add("Eve", OperatorRole::technician, "2468"), ErrorCode::configuration);
+  EXPECT_FAILS(operators_.disable("Eve"), ErrorCode::configuration);
+  EXPECT_EQ(operators_.sign_in("a", "Eve", "1357")->role, OperatorRole::engineer);
+  EXPECT_OK(operators_.add("Bo", OperatorRole::engineer, "1357"));
+  EXPECT_OK(operators_.disable("Eve"));
 }
 
 TEST_F(OperatorsTest, AListThatCannotBeReadLetsNobodyWork) {
