@@ -440,7 +440,28 @@ class Repair {
     }
   }
 
+  // What lies at the output's name may be the recording: nobody is told to remove that.
+  Status refuse_recording_as_output() const {
+    const auto there = env_.files.info(output_);
+    const bool has_no_inodes = before_.device == 0 && before_.inode == 0;
+    if (!there || has_no_inodes || there->device != before_.device ||
+        there->inode != before_.inode) {
+      return {};
+    }
+    const auto is_link = [&](const std::string& path) {
+      const auto info = env_.files.link_info(path);
+      return info && info->is_link;
+    };
+    // Where the input is named by a link, this may be that very link.
+    return is_link(output_) && !is_link(report_.input)
+               ? fail(ErrorCode::cannot_create, "this is a link to the recording itself", output_,
+                      "remove the link, or choose another output folder")
+               : fail(ErrorCode::cannot_create, "this is the recording itself", output_,
+                      "choose another output folder");
+  }
+
   Status write() {
+    SIXPOINT_CHECK(refuse_recording_as_output());
     if (written_) {
       report_.input_sha256 = written_->input_sha256;
     } else {

@@ -22,6 +22,8 @@
 // | ... that the file's own still periods contradict        | not_repairable, but with force     |
 // | ... that do not help by the gate (gate.h)               | not_repairable, but with force     |
 // | affected, with constants, output not there              | repaired                           |
+// | ... the output's name is that of the recording itself   | failed: cannot_create              |
+// |     (device and inode), or of a link to it              |                                    |
 // | ... output there, done (earlier_output.h), resume on    | repaired, `resumed`; nothing done  |
 // | ... ... but its log is not what would be written now    | failed: cannot_create              |
 // | ... output there, outdated                              | outdated; with redo_outdated       |

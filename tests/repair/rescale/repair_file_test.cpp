@@ -779,6 +779,51 @@ TEST_F(RepairFile, ALinkThatLeadsNowhereIsNotReplaced) {
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "out.gt3x"));
 }
 
+// Whoever did what the line says would lose the original: only a link may be removed.
+TEST_F(RepairFile, NobodyIsToldToRemoveTheRecordingItself) {
+  namespace fs = std::filesystem;
+  const sixpoint::tests::TemporaryFolder folder;
+  const std::string input = folder / "in.gt3x";
+  ASSERT_OK(six_sides().write(posix_env().files, input));
+  fs::create_hard_link(input, folder / "hard.gt3x");
+  fs::create_symlink(input, folder / "link.gt3x");
+  fs::create_directory_symlink(folder.path(), folder / "sub");
+  const Bytes before = read_file(posix_env().files, input).value();
+  RepairOptions resume;
+  resume.resume = true;
+  RepairOptions redo = resume;
+  redo.redo_outdated = true;
+  RepairOptions dry;
+  dry.dry_run = true;
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const RepairOptions& options) {
+    const RepairReport report =
+        repair_file(posix_env(), folder / from, folder / to, source_, options);
+    EXPECT_EQ(report.status, RepairStatus::failed) << from << " " << to;
+    const Error error = report.error.value_or(Error{});
+    EXPECT_EQ(error.code, ErrorCode::cannot_create) << from << " " << to;
+    return error.what + "; " + error.hint;
+  };
+  for (const RepairOptions& options : {RepairOptions{}, resume, redo, dry}) {
+    for (const auto& [from, to] : {std::pair("in.gt3x", "in.gt3x"),
+                                   {"in.gt3x", "hard.gt3x"},
+                                   {"in.gt3x", "sub/in.gt3x"},
+                                   {"link.gt3x", "link.gt3x"},
+                                   {"link.gt3x", "in.gt3x"}}) {
+      EXPECT_EQ(refused(from, to, options),
+                "this is the recording itself; choose another output folder")
+          << from << " " << to;
+    }
+    EXPECT_EQ(refused("in.gt3x", "link.gt3x", options),
+              "this is a link to the recording itself; remove the link, or choose another output "
+              "folder");
+  }
+  EXPECT_EQ(read_file(posix_env().files, input).value(), before);
+  fs::remove(folder / "link.gt3x");
+  EXPECT_EQ(repair_file(posix_env(), input, folder / "link.gt3x", source_, resume).status,
+            RepairStatus::repaired);
+}
+
 // Where the rest of a file says something else than its first 100,000 samples, what was written
 // until then is dropped; the answer is that of two passes.
 TEST_F(RepairFile, WhatTheBeginningSaysNeedNotHold) {
