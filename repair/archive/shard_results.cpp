@@ -149,8 +149,10 @@ Result<ShardReports> ShardFolder::parse(std::string_view text) const {
     SIXPOINT_ASSIGN(auto report, report_of(json));
     // JSON holds no bytes that are no UTF-8; the manifest does.
     report.input = input_of(index);
-    if (!report.output.empty()) {
-      report.output = all.output_folder + "/" + manifest_[index].relative;
+    for (std::string* name : {&report.output, &report.linked}) {
+      if (!name->empty()) {
+        *name = all.output_folder + "/" + manifest_[index].relative;
+      }
     }
     all.reports.emplace_back(index, std::move(report));
   }

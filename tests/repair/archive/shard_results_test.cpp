@@ -45,5 +45,35 @@ TEST_F(HostilePlan, AResultComesBackFileByFile) {
   EXPECT_EQ(to_string(standing_of(memory_.files, "/plan", plan_, 1).state), "missing");
 }
 
+// The names of a plan are any bytes; those of JSON are not.
+TEST_F(Archive, ALinkOfAnyNameComesBackAsItWas) {
+  MemoryEnv memory;
+  Random random(1);
+  MadeRecording sound = few_seconds(random);
+  sound.firmware = "1.8.0";
+  ASSERT_OK(memory.files.make_folders("/archive"));
+  ASSERT_OK(sound.write(memory.files, "/archive/\xff\xfe.gt3x"));
+  ArchiveDraft how = draft(1);
+  how.repair.link_unaffected = LinkKind::hard;
+  const auto planned = plan(memory, how);
+  ASSERT_OK(planned);
+  ShardRunOptions options = shard(0);
+  int made = 0;
+  options.make_link = [&](const std::string& from, const std::string& to, LinkKind) -> Status {
+    ++made;
+    SIXPOINT_ASSIGN(const Bytes bytes, read_file(memory.files, from));
+    SIXPOINT_ASSIGN(const auto file, memory.files.create(to));
+    return file->write_at(0, bytes);
+  };
+  ASSERT_OK(run_shard(memory.env, "/plan", planned->plan, options));
+  const auto read = read_result(memory.files, "/plan", planned->plan, 0);
+  ASSERT_OK(read);
+  EXPECT_EQ(read->files.at(0).linked, "/repaired/\xff\xfe.gt3x");
+  const auto again = run_shard(memory.env, "/plan", planned->plan, options);
+  ASSERT_OK(again);
+  EXPECT_EQ(again->done_before, 1U);
+  EXPECT_EQ(made, 1) << "what is done is not done again";
+}
+
 }  // namespace
 }  // namespace sixpoint::repair
