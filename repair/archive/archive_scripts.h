@@ -15,6 +15,7 @@ struct ArchiveScripts {
   std::string program;  // sixpoint, as the tasks reach it
   std::size_t shards = 0;
   std::size_t at_once = 0;  // tasks at a time; 0: as many as the queue lets run
+  std::size_t files = 0;    // of the plan: the merge's memory goes by them
 };
 
 std::string slurm_script(const ArchiveScripts& scripts);

@@ -237,7 +237,8 @@ Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft
     plan.units_sha256 = text_sha256(units);
     SIXPOINT_CHECK(write_file(files, folder + "/units.jsonl", units));
   }
-  const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once};
+  const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once,
+                               plan.files()};
   SIXPOINT_CHECK(write_file(files, folder + "/run.sbatch", slurm_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/merge.sbatch", merge_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/run_all.sh", shell_script(scripts)));

@@ -27,5 +27,16 @@ TEST_F(Archive, TheMergeWaitsForTheArrayHoweverItEnds) {
                                    "--output=/p/merge.log", "/p/merge.sbatch"));
 }
 
+// Measured: 343 MB with 60,000 files.
+TEST_F(Archive, TheMergeAsksForMemoryByTheNumberOfFiles) {
+  const auto asked = [](std::size_t files) {
+    return merge_script({"/p", "sixpoint", 12, 0, files});
+  };
+  EXPECT_THAT(asked(1), HasSubstr("#SBATCH --mem=1024M\n"));
+  EXPECT_THAT(asked(60'000), HasSubstr("#SBATCH --mem=1024M\n"));
+  EXPECT_THAT(asked(180'000), HasSubstr("#SBATCH --mem=2056M\n"));
+  EXPECT_THAT(asked(1'000'000), HasSubstr("#SBATCH --mem=10256M\n"));
+}
+
 }  // namespace
 }  // namespace sixpoint::repair
