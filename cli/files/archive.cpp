@@ -152,6 +152,12 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
           "shard {}: {} of its {} files changed since the plan was made\n", shard.shard,
           shard.changed, shard.files);
     }
+    if (shard.touched > 0) {
+      context.people << fmt::format(
+          "shard {}: outputs of {} of its {} files are not as it wrote them, or cannot be read, "
+          "and no run replaces them: look at them, remove what is wrong, then: {}\n",
+          shard.shard, shard.touched, shard.files, rerun.shard(shard.shard));
+    }
     if (!shard.wants_rerun()) {
       continue;
     }
@@ -159,8 +165,8 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
     context.people << (shard.complete()
                            ? fmt::format(
                                  "shard {}: {} of its {} files failed; try them again: {}\n",
-                                 shard.shard, shard.failed - shard.changed, shard.files,
-                                 rerun.shard(shard.shard))
+                                 shard.shard, shard.failed - shard.changed - shard.touched,
+                                 shard.files, rerun.shard(shard.shard))
                            : fmt::format("shard {} is {} ({} of {} files): {}\n", shard.shard,
                                          repair::to_string(shard.state), shard.files_done,
                                          shard.files, rerun.shard(shard.shard)));

@@ -8,12 +8,13 @@
 namespace sixpoint::repair {
 namespace {
 
-// A repaired file that is not what its shard wrote counts as failed: running the shard again finds
-// out what to do.
-void verify(FileSystem& files, RepairReport& report) {
+// A repaired file that is not what its shard wrote counts as failed. True where it is there: then no
+// run of the shard replaces it.
+bool verify(FileSystem& files, RepairReport& report) {
   if (report.status != RepairStatus::repaired) {
-    return;
+    return false;
   }
+  const bool is_there = files.info(report.output).has_value();
   Error error;
   const auto digest = file_sha256(files, report.output);
   if (!digest) {
@@ -22,12 +23,13 @@ void verify(FileSystem& files, RepairReport& report) {
     error = {ErrorCode::bad_data, "the repaired file is not what the shard wrote", report.output,
              "remove it and run the shard again"};
   } else {
-    return;
+    return false;
   }
   report.status = RepairStatus::failed;
   report.reasons = {error.brief()};
   report.error = std::move(error);
   report.output.clear();
+  return is_there;
 }
 
 }  // namespace
@@ -68,9 +70,7 @@ Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder
     shard.files_done = shard.files;
     shard.bytes_done = shard.bytes;
     for (RepairReport& report : result->files) {
-      if (options.verify) {
-        verify(files, report);
-      }
+      shard.touched += options.verify && verify(files, report) ? 1 : 0;
       shard.failed += report.status == RepairStatus::failed ? 1 : 0;
       shard.changed += has_changed_since_plan(report) ? 1 : 0;
     }

@@ -31,10 +31,20 @@ struct MergedShard {
   std::uint64_t bytes_done = 0;
   std::size_t failed = 0;     // files that the next run tries again
   std::size_t changed = 0;    // of these: has_changed_since_plan(), so the next run fails again
+  std::size_t touched = 0;    // of these: not as the shard wrote them (MergeOptions::verify)
   bool plan_damaged = false;  // as in ShardStanding
 
-  // What running the shard once more can change.
-  bool wants_rerun() const { return complete() ? failed > changed : !plan_damaged; }
+  // What running the shard once more can change:
+  //
+  // | the shard                                                   | wants a rerun |
+  // |-------------------------------------------------------------|---------------|
+  // | is not done, its list of files is as the plan wrote it      | yes           |
+  // | ... was changed or is gone                                  | no            |
+  // | is done, and files failed                                   | yes           |
+  // | ... because they changed since the plan was made            | no            |
+  // | ... because their outputs are there and not as it wrote them| no: a run     |
+  // |     (a person looks at them and removes them first)         | replaces none |
+  bool wants_rerun() const { return complete() ? failed > changed + touched : !plan_damaged; }
   bool wants_another_plan() const { return plan_damaged || changed > 0; }
   bool complete() const { return state == ShardState::done; }
 };

@@ -174,6 +174,54 @@ TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {
   EXPECT_THAT(damaged.people, testing::Not(HasSubstr("archive run")));
 }
 
+TEST_F(ArchiveCommand, AnOutputThatWasTouchedIsRemovedBeforeTheRunIsAdvised) {
+  EXPECT_OK(some_minutes(1, 900).write(files_, archive_ + "/a.gt3x"));
+  ASSERT_EQ(plan().exit_code, 0);
+  run_shard(0);
+  const std::string output = out_ + "/a.gt3x";
+  const Bytes whole = read_file(files_, output).value();
+  Bytes touched = whole;
+  touched[touched.size() / 2] ^= 1U;
+  std::ofstream(output, std::ios::binary | std::ios::trunc)
+      << std::string(touched.begin(), touched.end());
+  const std::string command = "sixpoint archive run " + plan_ + " --shard 0 -o " + out_;
+  const Answer found = run({"archive", "merge", plan_, "--verify"});
+  EXPECT_EQ(found.exit_code, 65);
+  EXPECT_THAT(found.people, HasSubstr("look at them, remove what is wrong, then: " + command));
+  EXPECT_THAT(found.people, testing::Not(HasSubstr("try them again")));
+  EXPECT_TRUE(merge({"--verify"}).json()["shards"][0]["rerun"].is_null());
+  std::filesystem::remove(output);
+  EXPECT_THAT(run({"archive", "merge", plan_, "--verify"}).people,
+              HasSubstr("1 of its 1 files failed; try them again: " + command));
+  EXPECT_EQ(run_shard(0).exit_code, 0);
+  EXPECT_EQ(merge({"--verify"}).exit_code, 0);
+}
+
+// Slurm kills what takes more memory than it asked for.
+TEST_F(ArchiveCommand, AMergeThatIsKilledLeavesTheEarlierAnswer) {
+  fill();
+  ASSERT_EQ(plan({"--shards", "1"}).exit_code, 0);
+  run_shard(0);
+  const auto job = [&](const std::string& program) {
+    const std::string line = "env SIXPOINT=" + program + " bash " + plan_ + "/merge.sbatch 2>&1";
+    const int status = std::system((line + " >/dev/null").c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  const auto answer = [&] { return Json::parse(std::ifstream(plan_ + "/merge.json")); };
+  EXPECT_EQ(job(SIXPOINT_PROGRAM), 65) << "one file is no zip";
+  const Json whole = answer();
+  EXPECT_EQ(whole["complete"], true);
+  for (const char* printed : {"", "{\n\"schema\": 1,\n\"files\": [\n"}) {
+    std::ofstream(folder_ / "killed") << "#!/bin/sh\nprintf '" << printed << "'\nkill -9 $$\n";
+    std::filesystem::permissions(folder_ / "killed", std::filesystem::perms::owner_all);
+    EXPECT_EQ(job(folder_ / "killed"), 137);
+    EXPECT_EQ(answer(), whole);
+  }
+  std::filesystem::remove(plan_ + "/results/00000.jsonl");
+  EXPECT_EQ(job(SIXPOINT_PROGRAM), 2);
+  EXPECT_EQ(answer()["complete"], false) << "a whole answer takes its place";
+}
+
 TEST_F(ArchiveCommand, TheSlurmScriptRunsOneShardPerTask) {
   plan_ = folder_ / "it's a\nplan; exit 9";
   out_ = folder_ / "out put";

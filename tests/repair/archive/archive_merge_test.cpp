@@ -21,6 +21,33 @@ TEST_F(HostilePlan, VerifyFindsAnOutputThatWasTouched) {
   const auto merged = merge_archive(memory_.files, "/plan", plan_, options);
   ASSERT_OK(merged);
   EXPECT_EQ(merged->shards[0].failed, blind->shards[0].failed + 1);
+  EXPECT_EQ(merged->shards[0].touched, 1U);
+  ASSERT_OK(memory_.files.remove(repaired_file->output));
+  const auto removed = merge_archive(memory_.files, "/plan", plan_, options);
+  ASSERT_OK(removed);
+  EXPECT_EQ(removed->shards[0].failed, blind->shards[0].failed + 1);
+  EXPECT_EQ(removed->shards[0].touched, 0U) << "a run makes it anew";
+}
+
+// The table of archive_merge.h, row by row.
+TEST(MergedShard, WantsARerunByTheTable) {
+  MergedShard shard;
+  shard.state = ShardState::missing;
+  EXPECT_TRUE(shard.wants_rerun());
+  shard.plan_damaged = true;
+  EXPECT_FALSE(shard.wants_rerun());
+  shard = {};
+  shard.state = ShardState::done;
+  EXPECT_FALSE(shard.wants_rerun()) << "nothing failed";
+  shard.failed = 3;
+  EXPECT_TRUE(shard.wants_rerun());
+  shard.changed = 2;
+  EXPECT_TRUE(shard.wants_rerun());
+  shard.touched = 1;
+  EXPECT_FALSE(shard.wants_rerun());
+  shard.failed = 1;
+  shard.changed = 0;
+  EXPECT_FALSE(shard.wants_rerun());
 }
 
 TEST_F(HostilePlan, AMergeNamesTheShardsThatAreMissing) {
