@@ -62,7 +62,9 @@ class ShardRun {
     const std::string output = real_place(files_, options_.output_folder);
     for (const ArchiveRoot& root : plan_.roots) {
       const std::string archive = real_place(files_, root.path);
-      if (root.whole && (is_inside(output, archive) || is_inside(archive, output))) {
+      const bool lie_in_one_another = is_inside(output, archive) || is_inside(archive, output);
+      // Of the folder of files that were named, only they are archive: each would be its own output.
+      if (root.whole ? lie_in_one_another : output == archive) {
         return fail(ErrorCode::usage,
                     fmt::format("the output folder and the archive {} lie in one another",
                                 printable(root.path)),
@@ -233,8 +235,9 @@ class ShardRun {
       }
       return failed_report(input, error);
     }
-    if (!is_as_planned(planned, input, *before)) {
-      return failed_report(input, changed_since_plan(input));
+    const auto as_planned = is_as_planned(planned, input, *before);
+    if (!as_planned || !*as_planned) {
+      return failed_report(input, as_planned ? changed_since_plan(input) : as_planned.error());
     }
     const std::string output = options_.output_folder + "/" + planned.relative;
     if (const auto status = check_output_place(files_, options_.output_folder, output); !status) {
@@ -259,16 +262,17 @@ class ShardRun {
     return failed_report(input, changed_since_plan(input));
   }
 
-  bool is_as_planned(const ArchiveFile& planned, const std::string& input, const FileInfo& info) {
+  Result<bool> is_as_planned(const ArchiveFile& planned, const std::string& input,
+                             const FileInfo& info) {
     if (info.is_folder || info.size != planned.size) {
       return false;
     }
-    if (info.modified_ns == planned.modified_ns) {
-      return true;
+    if (planned.sha256.empty()) {
+      return info.modified_ns == planned.modified_ns;
     }
-    // A copy of the archive has other times; where there is a hash, the hash decides.
-    const auto digest = planned.sha256.empty() ? "" : file_sha256(files_, input).value_or("");
-    return !digest.empty() && digest == planned.sha256;
+    // A copy of the archive has other times, and a file that was changed may have its old one.
+    SIXPOINT_ASSIGN(const auto digest, file_sha256(files_, input));
+    return digest == planned.sha256;
   }
 
   static Error changed_since_plan(const std::string& input) {

@@ -2,8 +2,15 @@
 // step.
 #include "repair/archive/archive_run.h"
 
+#include <array>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
 #include "repair/archive/archive_fixture.h"
 #include "repair/archive/output_lock.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -238,6 +245,70 @@ TEST_F(Archive, AFileThatChangedSinceThePlanIsReportedAndNotRepaired) {
     EXPECT_EQ(result->files[3].status, hash ? RepairStatus::repaired : RepairStatus::failed)
         << "where there is a hash, the hash decides";
   }
+}
+
+// A copy that keeps the time, or a disk that lost bytes: size and time are as they were. A file that
+// needs no repair is not hashed on its way.
+TEST_F(Archive, WhereThePlanHasHashesTheyDecideForEveryFile) {
+  namespace fs = std::filesystem;
+  const sixpoint::tests::TemporaryFolder folder;
+  Env& env = posix_env();
+  fs::create_directories(folder / "archive");
+  Random random(1);
+  MadeRecording made = few_seconds(random);
+  made.serial = "MOS2A45130450";
+  made.firmware = "1.5.0";
+  MadeRecording sound = made;
+  sound.firmware = "1.8.0";
+  const auto write = [&] {
+    EXPECT_OK(made.write(env.files, folder / "archive/affected.gt3x"));
+    EXPECT_OK(sound.write(env.files, folder / "archive/sound.gt3x"));
+  };
+  write();
+  ArchiveDraft how = draft(1);
+  how.paths = {folder / "archive"};
+  how.hash = true;
+  auto planned = plan_archive(env, how);
+  ASSERT_OK(planned);
+  ASSERT_OK(write_plan(env, folder / "plan", how, *planned));
+  made.raw[3][1] += 1;
+  sound.raw[3][1] += 1;
+  write();
+  for (const ArchiveFile& file : planned->files) {
+    const std::string path = planned->plan.input_of(file);
+    ASSERT_EQ(fs::file_size(path), file.size);
+    std::array<timespec, 2> times{};
+    times[0].tv_nsec = UTIME_OMIT;
+    times[1].tv_sec = file.modified_ns / 1'000'000'000;
+    times[1].tv_nsec = file.modified_ns % 1'000'000'000;
+    ASSERT_EQ(::utimensat(AT_FDCWD, path.c_str(), times.data(), 0), 0);
+    ASSERT_EQ(env.files.info(path).value().modified_ns, file.modified_ns);
+  }
+  ShardRunOptions options = shard(0);
+  options.output_folder = folder / "out";
+  const auto result = run_shard(env, folder / "plan", planned->plan, options);
+  ASSERT_OK(result);
+  ASSERT_EQ(result->files.size(), 2U);
+  for (const RepairReport& report : result->files) {
+    EXPECT_TRUE(has_changed_since_plan(report)) << report.brief();
+  }
+  EXPECT_FALSE(fs::exists(folder / "out/affected.gt3x"));
+}
+
+TEST_F(Archive, TheFolderOfAFileThatWasNamedIsNoOutputFolder) {
+  MemoryEnv memory;
+  Random random(3);
+  ASSERT_OK(memory.files.make_folders("/archive"));
+  ASSERT_OK(few_seconds(random).write(memory.files, "/archive/a.gt3x"));
+  ArchiveDraft how = draft(1);
+  how.paths = {"/archive/a.gt3x"};
+  const auto planned = plan(memory, how);
+  ASSERT_OK(planned);
+  ShardRunOptions options = shard(0);
+  options.output_folder = "/archive";
+  EXPECT_FAILS(run_shard(memory.env, "/plan", planned->plan, options), ErrorCode::usage);
+  options.output_folder = "/archive/repaired";
+  EXPECT_OK(run_shard(memory.env, "/plan", planned->plan, options)) << "another folder may";
 }
 
 TEST_F(HostilePlan, OutputFoldersThatCannotBe) {
