@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include <fmt/format.h>
 
 #include "base/sha256.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/output_place.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -77,13 +79,17 @@ class Planner {
     SIXPOINT_ASSIGN(auto tree, find_files(env_.files, path, {{".gt3x"}, /*follow_out=*/false}));
     made_.not_followed.insert(made_.not_followed.end(), tree.not_followed.begin(),
                               tree.not_followed.end());
-    made_.plan.refused.insert(made_.plan.refused.end(), tree.refused.begin(), tree.refused.end());
+    for (RefusedPath& refused : tree.refused) {
+      if (places_.insert(place_of(env_.files, refused.path)).second) {
+        made_.plan.refused.push_back(std::move(refused));
+      }
+    }
     const std::size_t root = root_of({info.is_folder ? path : folder_of(path), info.is_folder});
     for (FoundFile& file : tree.files) {
-      const auto [other, fresh] = taken_.emplace(file.relative, file.path);
-      if (!fresh && plain_path(other->second) == plain_path(file.path)) {
-        continue;  // named twice
+      if (!places_.insert(place_of(env_.files, file.path)).second) {
+        continue;  // named twice, also by folders that lie in one another
       }
+      const auto [other, fresh] = taken_.emplace(file.relative, file.path);
       if (!fresh) {
         made_.plan.refused.push_back(
             {file.path,
@@ -166,6 +172,7 @@ class Planner {
   const ArchiveDraft& draft_;
   PlannedArchive made_;
   std::map<std::pair<std::string, bool>, std::size_t> roots_;
+  std::set<std::string> places_;              // of all files so far, by place_of()
   std::map<std::string, std::string> taken_;  // output -> input
 };
 

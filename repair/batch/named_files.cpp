@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "repair/rescale/output_place.h"
+
 namespace sixpoint::repair {
 
 NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
@@ -12,8 +14,10 @@ NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
   NamedFiles named;
   std::set<std::string> taken;
   const auto refuse = [&](const std::string& path, const Error& error) {
-    named.files.emplace_back().path = path;
-    named.files.back().error = error;
+    if (taken.insert(place_of(files, path)).second) {
+      named.files.emplace_back().path = path;
+      named.files.back().error = error;
+    }
   };
   for (const std::string& path : paths) {
     const auto found = find_files(files, path, {endings});
@@ -28,7 +32,7 @@ NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
       named.empty_folders.push_back(path);
     }
     for (const FoundFile& file : found->files) {
-      if (taken.insert(plain_path(file.path)).second) {
+      if (taken.insert(place_of(files, file.path)).second) {
         named.files.push_back({file, std::nullopt});
       }
     }

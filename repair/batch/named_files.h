@@ -20,7 +20,7 @@ struct NamedFile : FoundFile {
 };
 
 struct NamedFiles {
-  std::vector<NamedFile> files;  // in the order of the paths; one that is named twice, once
+  std::vector<NamedFile> files;            // in the order of the paths; each place_of() once
   std::vector<std::string> empty_folders;  // without a file of these endings
 };
 NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,

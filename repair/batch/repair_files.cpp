@@ -259,8 +259,7 @@ void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
     return;  // it is not there yet
   }
   const auto lies_in_output = [&](const NamedFile& file) {
-    const auto in = files.real_path(folder_of(file.path));
-    const std::string real = in ? *in + "/" + file_name_of(file.path) : std::string();
+    const std::string real = place_of(files, file.path);
     const std::string below = "/" + file.relative;
     if (file.error || !real.ends_with(below)) {
       return false;  // it, or a folder above it, is a link that leads out of the tree

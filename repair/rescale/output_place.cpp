@@ -11,10 +11,14 @@ std::string real_place(FileSystem& files, const std::string& path) {
     return *std::move(real);
   }
   const std::string parent = folder_of(path);
-  if (parent == path || parent == ".") {
+  if (parent == path) {
     return path;
   }
   return real_place(files, parent) + "/" + file_name_of(path);
+}
+
+std::string place_of(FileSystem& files, const std::string& path) {
+  return plain_path(real_place(files, folder_of(path)) + "/" + file_name_of(path));
 }
 
 Status check_output_place(FileSystem& files, const std::string& folder, const std::string& output) {

@@ -19,6 +19,10 @@ namespace sixpoint::repair {
 // The part of `path` that is there, without links, and the rest as it is written.
 std::string real_place(FileSystem& files, const std::string& path);
 
+// One file by whatever path it is named, from whatever folder: its folder as real_place() has it,
+// and its own name. A name that is itself a link is a file of its own.
+std::string place_of(FileSystem& files, const std::string& path);
+
 // Asked before each output is written. `output`: a name below `folder`.
 Status check_output_place(FileSystem& files, const std::string& folder, const std::string& output);
 

@@ -1,6 +1,9 @@
 #include "repair/archive/archive_plan.h"
 
+#include <filesystem>
+
 #include "repair/archive/archive_fixture.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -46,6 +49,35 @@ TEST_F(Archive, CutsShardsAsEvenlyAsTheFilesAllow) {
     }
     EXPECT_EQ(largest(ends), best);
   }
+}
+
+TEST_F(Archive, AFileIsPlannedOnceByWhateverRootsItIsFound) {
+  namespace fs = std::filesystem;
+  const sixpoint::tests::TemporaryFolder folder;
+  Env& env = posix_env();
+  fs::create_directories(folder / "tree/sub");
+  Random random(1);
+  ASSERT_OK(few_seconds(random).write(env.files, folder / "tree/a.gt3x"));
+  ASSERT_OK(few_seconds(random).write(env.files, folder / "tree/sub/b.gt3x"));
+  fs::create_symlink("nowhere", folder / "tree/sub/none.gt3x");
+  fs::create_directory_symlink(folder / "tree", folder / "other-name");
+  const auto outputs = [&](const std::vector<std::string>& paths) {
+    ArchiveDraft how = draft(1);
+    how.paths = paths;
+    const auto planned = plan_archive(env, how);
+    EXPECT_OK(planned);
+    std::vector<std::string> names;
+    for (const ArchiveFile& file : planned->files) {
+      names.push_back(file.relative);
+    }
+    EXPECT_EQ(planned->plan.refused.size(), 1U) << "the link that leads nowhere";
+    return names;
+  };
+  const std::string tree = folder / "tree";
+  EXPECT_THAT(outputs({tree, tree + "/sub"}), testing::ElementsAre("a.gt3x", "sub/b.gt3x"));
+  EXPECT_THAT(outputs({tree + "/sub", tree}), testing::ElementsAre("b.gt3x", "a.gt3x"));
+  EXPECT_THAT(outputs({tree, tree + "/./sub/../sub/b.gt3x", folder / "other-name"}),
+              testing::ElementsAre("a.gt3x", "sub/b.gt3x"));
 }
 
 TEST_F(Archive, AFolderWithoutRecordingsAndTooManyShardsAreRefused) {

@@ -38,6 +38,21 @@ TEST_F(OutputPlace, InTheFolderOrBelowIt) {
   EXPECT_OK(check_output_place(posix_env().files, folder_ / "none", folder_ / "none/a/b.gt3x"));
 }
 
+TEST_F(OutputPlace, AFileHasOnePlaceByWhateverPath) {
+  FileSystem& files = posix_env().files;
+  const std::string real = std::filesystem::canonical(out_).string();
+  const std::string place = real + "/site/a.gt3x";
+  for (const std::string& name :
+       {out_ + "/site/a.gt3x", out_ + "//site/./a.gt3x", out_ + "/leads-out/../out/site/a.gt3x",
+        out_ + "/stays/a.gt3x", folder_ / "other-name/site/a.gt3x"}) {
+    EXPECT_EQ(place_of(files, name), place) << name;
+  }
+  EXPECT_EQ(place_of(files, out_ + "/stays"), real + "/stays") << "a link is a file of its own";
+  const std::string here = std::filesystem::current_path().string();
+  EXPECT_EQ(place_of(files, "none.gt3x"), here + "/none.gt3x");
+  EXPECT_EQ(place_of(files, "no-such-folder/none.gt3x"), here + "/no-such-folder/none.gt3x");
+}
+
 TEST_F(OutputPlace, ElsewhereIsRefused) {
   for (const char* below : {"leads-out/a.gt3x", "leads-out/new/a.gt3x", "site/../../a.gt3x"}) {
     EXPECT_FAILS(check(below), ErrorCode::cannot_create);
