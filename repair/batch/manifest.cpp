@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "base/text/csv_field.h"
 #include "base/text/json_text.h"
 #include "db/records.h"
+#include "repair/rescale/output_place.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -39,11 +41,21 @@ Json manifest_in(FileSystem& files, const std::string& folder) {
   return Json::object();
 }
 
-Json entry_of(const RepairReport& report) {
+// One name for one file in the lines of all runs.
+std::string name_of(FileSystem& files, const std::string& path) {
+  return db::storable_path(place_of(files, path));
+}
+
+// An escaped name cannot be looked up: its line stays.
+bool may_be_there(FileSystem& files, const std::string& name) {
+  return files.link_info(name).has_value() || name.find("\\x") != std::string::npos;
+}
+
+Json entry_of(FileSystem& files, const RepairReport& report) {
   const Json all = report.to_json();
-  Json entry = {{"input", db::storable_path(report.input)}, {"output", nullptr}};
+  Json entry = {{"input", name_of(files, report.input)}, {"output", nullptr}};
   if (!report.output.empty()) {
-    entry["output"] = db::storable_path(report.output);
+    entry["output"] = name_of(files, report.output);
   }
   for (const char* key : {"status", "source", "still_error_mg", "input_sha256", "output_sha256"}) {
     entry[key] = all[key];
@@ -119,9 +131,15 @@ Status check_manifest(FileSystem& files, const std::string& folder) {
 Status write_manifest(FileSystem& files, const std::string& folder,
                       const std::vector<RepairReport>& reports, UtcTime now,
                       const std::string& software) {
-  std::map<std::string, const RepairReport*> of_this_run;
+  std::vector<Json> lines;                         // of this run; null for what an earlier one says
+  std::map<std::string, std::size_t> of_this_run;  // by input
+  std::set<std::string> outputs;                   // of this run
   for (const RepairReport& report : reports) {
-    of_this_run.emplace(db::storable_path(report.input), &report);
+    const Json& line = lines.emplace_back(entry_of(files, report));
+    of_this_run.emplace(line["input"].get<std::string>(), lines.size() - 1);
+    if (line["output"].is_string()) {
+      outputs.insert(line["output"].get<std::string>());
+    }
   }
   Json entries = Json::array();
   const Json earlier = manifest_in(files, folder);
@@ -131,16 +149,24 @@ Status write_manifest(FileSystem& files, const std::string& folder,
       continue;
     }
     const auto now_too = of_this_run.find(input.get<std::string>());
-    if (now_too == of_this_run.end()) {
+    const bool is_now_too = now_too != of_this_run.end();
+    if (is_now_too) {
+      if (auto kept = entry_of_earlier_output(reports[now_too->second], entry)) {
+        lines[now_too->second] = nullptr;
+        entries.push_back(*std::move(kept));
+        continue;
+      }
+    }
+    const Json output = entry.value("output", Json());
+    const std::string name = output.is_string() ? output.get<std::string>() : std::string();
+    const bool stays = !is_now_too || (!name.empty() && may_be_there(files, name));
+    if (stays && !outputs.contains(name)) {
       entries.push_back(entry);
-    } else if (auto kept = entry_of_earlier_output(*now_too->second, entry)) {
-      of_this_run.erase(now_too);
-      entries.push_back(*std::move(kept));
     }
   }
-  for (const RepairReport& report : reports) {
-    if (of_this_run.contains(db::storable_path(report.input))) {
-      entries.push_back(entry_of(report));
+  for (Json& line : lines) {
+    if (!line.is_null()) {
+      entries.push_back(std::move(line));
     }
   }
   std::string csv(kColumns);

@@ -7,16 +7,20 @@
 //
 // units.csv beside them has a line per unit of the run (repair/units/unit_needs.h).
 //
-// A line says of a file what the last run that met it says. The first row that fits decides:
+// A line says of a file what the last run that met it says, and no output that lies in the folder
+// loses its line. Of the lines of earlier runs, the first row that fits decides:
 //
-// | the file in this run                                | its line                              |
-// |-----------------------------------------------------|---------------------------------------|
-// | not in it                                           | as it was                             |
-// | `outdated`, or `failed` because its output is there | the earlier one under this status     |
-// | (cannot_create); an earlier line has that output,   |                                       |
-// | made of this very input (SHA-256)                   |                                       |
-// | otherwise                                           | of this run alone                     |
+// | line of an earlier run                                       | becomes                      |
+// |--------------------------------------------------------------|------------------------------|
+// | of a file of this run that is `outdated`, or `failed` because| stays, under this run's      |
+// | its output is there (cannot_create); the line has an output, | status, and is the file's    |
+// | made of this very input (SHA-256)                            | line of this run             |
+// | has an output that is one of this run                        | goes                         |
+// | of a file that is not in this run                            | stays                        |
+// | has an output that is there                                  | stays, beside this run's line|
+// | otherwise                                                    | goes                         |
 //
+// Files are named from the root of the disk (place_of()), so a file is the same one in every run.
 // Names that are no UTF-8 are escaped (\xNN); the CSV is quoted as RFC 4180 has it.
 #pragma once
 

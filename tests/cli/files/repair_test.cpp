@@ -288,10 +288,62 @@ TEST_F(RepairCommand, WhatFailedStandsInTheManifestAndInTheNextStep) {
   EXPECT_THAT(again.people, testing::Not(HasSubstr("sixpoint impact")));
   EXPECT_THAT(again.people, HasSubstr("1 of the files failed; do what their lines say"));
   EXPECT_THAT(again.people, HasSubstr("sixpoint repair " + archive_ + " -o " + out_));
-  const Json file = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"][0];
-  EXPECT_EQ(file["input"], archive_ + "/affected.gt3x");
-  EXPECT_EQ(file["status"], "failed");
-  EXPECT_TRUE(file["output"].is_null());
+  const Json files = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"];
+  ASSERT_EQ(files.size(), 3U);
+  EXPECT_EQ(files[0]["status"], "repaired") << "the output of the file that was there before";
+  EXPECT_EQ(files[1]["input"], archive_ + "/affected.gt3x");
+  EXPECT_EQ(files[1]["status"], "failed");
+  EXPECT_TRUE(files[1]["output"].is_null());
+}
+
+// Of a name that is relative only the folder in which it was typed says which file it is.
+TEST_F(RepairCommand, TheManifestKnowsAFileByWhateverPathItIsNamed) {
+  const auto before = std::filesystem::current_path();
+  const auto repair = [&](const std::string& in, const std::string& path) {
+    std::filesystem::current_path(in);
+    const auto answer = run(
+        {"repair", path, "-o", "../out", "--constants", folder_ / "constants.json", "--resume"});
+    std::filesystem::current_path(before);
+    EXPECT_EQ(answer.exit_code, 0) << answer.people;
+    std::vector<std::string> lines;
+    const Json manifest = Json::parse(std::ifstream(out_ + "/manifest.json"));
+    for (const Json& file : manifest["files"]) {
+      lines.push_back(file["input"].get<std::string>() + " " + file["status"].get<std::string>());
+    }
+    return lines;
+  };
+  const std::string affected = archive_ + "/affected.gt3x repaired";
+  const std::string sound = archive_ + "/sub/sound.gt3x not_affected";
+  std::filesystem::create_directories(folder_ / "other/sub");
+  EXPECT_THAT(repair(folder_ / "other", "../archive"), ElementsAre(affected, sound));
+  EXPECT_THAT(repair(folder_ / "other", archive_), ElementsAre(affected, sound));
+  EXPECT_THAT(repair(archive_, "."), ElementsAre(affected, sound));
+  // Another file of the same name in another folder.
+  MadeRecording other = half_hour();
+  other.firmware = "1.8.0";
+  ASSERT_OK(other.write(files_, folder_ / "other/affected.gt3x"));
+  EXPECT_THAT(repair(folder_ / "other", "."),
+              ElementsAre(affected, sound, folder_ / "other/affected.gt3x not_affected"));
+}
+
+TEST_F(RepairCommand, OnePathIsOneFileHoweverItIsNamed) {
+  const auto answer = run({"repair", archive_, archive_ + "/sub", archive_ + "/../archive",
+                           archive_ + "/none.gt3x", archive_ + "/./none.gt3x", "-o", out_,
+                           "--constants", folder_ / "constants.json", "--json"});
+  EXPECT_EQ(answer.exit_code, 66) << answer.people;
+  EXPECT_EQ(answer.json()["files"].size(), 3U) << "one of them is not there";
+}
+
+TEST_F(RepairCommand, TheFolderOfTheRecordingsIsNoOutputFolder) {
+  const Bytes before = read_file(files_, archive_ + "/affected.gt3x").value();
+  for (const char* more : {"--resume", "--redo-outdated", "--wide"}) {
+    const auto answer =
+        run({"repair", archive_, "-o", archive_, "--constants", folder_ / "constants.json", more});
+    EXPECT_EQ(answer.exit_code, 73);
+    EXPECT_THAT(answer.out, HasSubstr("this is the recording itself; choose another"));
+    EXPECT_THAT(answer.out + answer.people, testing::Not(HasSubstr("remove")));
+  }
+  EXPECT_EQ(read_file(files_, archive_ + "/affected.gt3x").value(), before);
 }
 
 // A file that would not be written now, and an earlier run's output of it: both are said.

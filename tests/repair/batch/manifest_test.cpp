@@ -132,6 +132,51 @@ TEST_F(Manifest, WhatFailedInThisRunStandsAsFailed) {
                                 "d.gt3x,,failed,,,,,,\r\n"));
 }
 
+// The same with outputs that lie in the folder, by the rows of the table. c.gt3x was replaced; d.gt3x
+// is the output of another file by now.
+TEST_F(Manifest, NoOutputThatLiesInTheFolderLosesItsLine) {
+  write({repaired("a.gt3x"), repaired("b.gt3x"), repaired("c.gt3x"), repaired("d.gt3x"),
+         repaired("e.gt3x"), repaired("f.gt3x")});
+  for (const std::string name : {"a", "b", "c", "d", "e"}) {
+    ASSERT_OK(write_file(memory_.files, "out/" + name + ".gt3x", "x"));
+  }
+  const auto other = [](const std::string& input, RepairStatus status, const std::string& hash) {
+    RepairReport report;
+    report.input = input;
+    report.status = status;
+    report.input_sha256 = hash;
+    return report;
+  };
+  RepairReport outdated = other("b.gt3x", RepairStatus::outdated, "aa");
+  RepairReport moved = repaired("elsewhere/d.gt3x");
+  moved.output = "out/d.gt3x";
+  for (int i = 0; i < 2; ++i) {
+    write({other("./a.gt3x", RepairStatus::not_affected, ""), outdated,
+           other("c.gt3x", RepairStatus::outdated, "cc"), moved,
+           other("f.gt3x", RepairStatus::not_affected, "")});
+    EXPECT_THAT(
+        text("out/manifest.csv"),
+        testing::EndsWith("output_sha256\r\n"
+                          "a.gt3x,out/a.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                          "b.gt3x,out/b.gt3x,outdated,store,0123,112.346,0.800,aa,bb\r\n"
+                          "c.gt3x,out/c.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                          "e.gt3x,out/e.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                          "a.gt3x,,not_affected,,,,,,\r\n"
+                          "c.gt3x,,outdated,,,,,cc,\r\n"
+                          "elsewhere/d.gt3x,out/d.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                          "f.gt3x,,not_affected,,,,,,\r\n"));
+  }
+}
+
+TEST_F(Manifest, AnOutputWhoseNameWasEscapedKeepsItsLine) {
+  write({repaired("\xff\xfe.gt3x")});
+  RepairReport again;
+  again.input = "\xff\xfe.gt3x";
+  again.status = RepairStatus::not_affected;
+  write({again});
+  EXPECT_THAT(text("out/manifest.csv"), HasSubstr("\\xff\\xfe.gt3x,out/\\xff\\xfe.gt3x,repaired"));
+}
+
 TEST_F(Manifest, LeavesAFileOfThatNameThatIsNotOursAlone) {
   ASSERT_OK(write_file(memory_.files, "out/manifest.csv", "mine"));
   EXPECT_FAILS(check_manifest(memory_.files, "out"), ErrorCode::cannot_create);
