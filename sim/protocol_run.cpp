@@ -148,6 +148,8 @@ class Runner {
     }
   }
 
+  Status problem() const { return check_effects(effects_); }
+
   void run() {
     const ProtocolSegment* before = nullptr;
     for (const ProtocolSegment& segment : run_.segments) {
@@ -303,7 +305,9 @@ class Runner {
 Result<ProtocolRecord> record(const ProtocolRun& run, bool with_times) {
   SIXPOINT_CHECK(check(run));
   ProtocolRecord made;
-  Runner(run, made, with_times).run();
+  Runner runner(run, made, with_times);
+  SIXPOINT_CHECK(runner.problem());
+  runner.run();
   return made;
 }
 

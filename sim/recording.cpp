@@ -45,6 +45,8 @@ class ScenarioLog final : public gt3x::ByteSource {
                    make_effects(scenario.effects, scenario.seed)),
         pending_(log_preamble(scenario.unit, scenario.start, scenario.rate_hz)) {}
 
+  Status problem() const { return simulator_.problem(); }
+
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
     if (at_ == pending_.size() && second_ < seconds_) {
       pending_.clear();
@@ -187,8 +189,9 @@ Result<RecordingReport> write_recording(FileSystem& files, const std::string& pa
   const auto seconds = static_cast<std::uint64_t>(std::floor(scenario.motion()->duration_s()));
   RecordingReport report;
   report.duration_s = static_cast<double>(seconds);
-  SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
   ScenarioLog log(scenario, seconds, report, truth);
+  SIXPOINT_CHECK(log.problem());
+  SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
   SIXPOINT_CHECK(writer.add("log.bin", log));
   SIXPOINT_CHECK(writer.add(
       "info.txt", recording_info(scenario.unit, scenario.start,

@@ -44,8 +44,9 @@ struct RecordingReport {
 // case's axes in g, one vector per stored sample.
 using TruthSink = std::function<Status(UtcTime time, std::span<const Eigen::Vector3d> true_g)>;
 
-// Simulates the scenario, whole seconds only, and writes it; memory does not grow with its length.
-// cannot_create where `path` cannot be made.
+// Simulates the scenario, whole seconds only, and writes it. Memory grows with
+// the length of free-living motion only: its bouts are kept, some hundreds of bytes a minute.
+// cannot_create where `path` cannot be made; configuration where an effect does not fit in.
 Result<RecordingReport> write_recording(FileSystem& files, const std::string& path,
                                         const Scenario& scenario, const TruthSink& truth = {});
 

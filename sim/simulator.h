@@ -39,6 +39,8 @@ class Simulator {
   Simulator(const UnitTruth& unit, const SimulatorOptions& options, Motion& motion,
             std::vector<std::unique_ptr<Effect>> effects = {});
 
+  // configuration where an effect has no room in the recording: next() goes on without it.
+  Status problem() const { return check_effects(effects_); }
   // The next `samples`; `block` is overwritten; its memory is used again.
   void next(std::size_t samples, SimulatedBlock& block);
   std::uint64_t samples() const { return done_; }

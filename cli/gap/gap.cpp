@@ -120,7 +120,7 @@ void print_gap(const gap::Diagnosis& d, Context& context) {
     context.text() << fmt::format("  {:<20} p {:.3f}  matters {:.3f}  held out {:+.1f} nats",
                                   effect.name, effect.probability, effect.probability_it_matters,
                                   effect.held_out_gain_nats);
-    for (const gap::NamedValue& p : effect.parameters) {
+    for (const gap::NamedValue& p : effect.all_parameters()) {
       context.text() << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
       context.text() << (p.sd.empty()
                              ? ""

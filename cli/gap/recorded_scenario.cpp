@@ -48,6 +48,7 @@ Json recorded_scenario(const gap::Diagnosis& diagnosis, const gap::Bundle& bundl
   Json json = gap::augmented_scenario(diagnosis);
   json["rate_hz"] = bundle.rate_hz;
   json["gravity_g"] = bundle.gravity_g;
+  json["unit"]["accel_scale_lsb_per_g"] = bundle.accel_scale_lsb_per_g;
   const auto nominal_mg = sim::nominal_noise_mg(bundle.rate_hz);
   for (std::size_t a = 0; a < kAxes; ++a) {
     json["unit"]["noise_mg"][a] =

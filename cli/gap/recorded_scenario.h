@@ -4,8 +4,8 @@
 //   SIXPOINT_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(bundle, {}));
 //   const Json scenario = recorded_scenario(diagnosis, bundle);   // for `sixpoint simulate`
 //
-// gap::augmented_scenario() with the bundle's own sample rate, gravity and segments in place of a
-// standard protocol, whose poses would come in another order; and with the simulator's noise where
+// gap::augmented_scenario() with the bundle's own sample rate, scale, gravity and segments in place of
+// a standard protocol, whose poses would come in another order; and with the simulator's noise where
 // rounding hides how large the unit's is. Segments follow each other there: what lies between them
 // in the recording is left out. Phases of tones and the unit's own temperature log are not in it:
 // the simulator draws the ones and follows the commanded temperatures. A pure function.

@@ -45,6 +45,8 @@ class Adding {
     }
   }
 
+  Status problem() const { return sim::check_effects(effects_); }
+
   std::vector<gt3x::Counts> run() {
     Eigen::Matrix3d before = bundle_.segments.front().rotation;
     for (const gap::Segment& segment : bundle_.segments) {
@@ -192,11 +194,17 @@ Status write_recorded_trial(FileSystem& files, const std::string& from, const st
                   "give a bundle of faces, as a run of the jig is");
     }
   }
-  const std::vector<gt3x::Counts> counts = Adding(bundle, effects, seed).run();
+  Adding adding(bundle, effects, seed);
+  SIXPOINT_CHECK(adding.problem());
+  const std::vector<gt3x::Counts> counts = adding.run();
   sim::GivenProperties given;
   if (!bundle.header.serial.empty()) {
     given.serial = bundle.header.serial;
   }
+  if (!bundle.header.firmware.empty()) {
+    given.firmware = bundle.header.firmware;
+  }
+  given.accel_scale_lsb_per_g = bundle.accel_scale_lsb_per_g;
   const sim::UnitTruth unit = sim::draw_unit(seed, given);
   const UtcTime start = from_unix_seconds(1'640'439'383);
   const auto rate = static_cast<std::size_t>(std::lround(bundle.rate_hz));

@@ -109,10 +109,17 @@ double sign_of_step(double step_g) {
 Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
   const double warm = block.temperature_c - kReference_c;
   const double hours = block.middle_s / 3600;
-  // Mean of exp(-t/tau) over the block.
+  // Mean over the block of exp(-t / tau), and of 1 before power-on, as sim/ has it. Its ends are taken
+  // apart: of a block of many tau the sinh of half its length overflows.
   const auto decay = [&](double tau_s) {
-    const double half = block.seconds / (2 * tau_s);
-    return std::exp(-block.middle_s / tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
+    const double from_s = std::max(0.0, block.middle_s - block.seconds / 2);
+    const double to_s = std::max(0.0, block.middle_s + block.seconds / 2);
+    const double start = std::exp(-from_s / tau_s);
+    if (!(block.seconds > 0)) {
+      return start;
+    }
+    const double before_s = block.seconds - (to_s - from_s);
+    return (before_s - tau_s * start * std::expm1((from_s - to_s) / tau_s)) / block.seconds;
   };
   Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
                             warm * warm * warm * s.tempco_cubic_mg_per_c3 +

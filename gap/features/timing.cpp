@@ -5,6 +5,8 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <queue>
+#include <span>
 
 namespace sixpoint::gap {
 namespace {
@@ -89,11 +91,12 @@ std::vector<double> clear_slips(const Stamps& stamps, double slope, double inter
   return slips;
 }
 
+constexpr std::size_t kAveraged = 5;  // stamps on either side of a slip, where stamps are jittery
+
 // Mean of up to five values from `at` on, less that of as many before it.
-double step_at(const std::vector<double>& level, std::size_t at) {
-  constexpr std::size_t kMost = 5;
-  const std::size_t before = std::min(at, kMost);
-  const std::size_t behind = std::min(level.size() - at, kMost);
+double step_at(std::span<const double> level, std::size_t at) {
+  const std::size_t before = std::min(at, kAveraged);
+  const std::size_t behind = std::min(level.size() - at, kAveraged);
   double step = 0;
   for (std::size_t k = 0; k < before; ++k) {
     step -= level[at - 1 - k] / static_cast<double>(before);
@@ -104,40 +107,73 @@ double step_at(const std::vector<double>& level, std::size_t at) {
   return step;
 }
 
-// The same where stamps are jittery: neighbours of a slip are averaged, the largest slip first.
-std::vector<double> slips_in_jitter(const Stamps& stamps, double slope, double interval_s) {
-  constexpr std::size_t kLeast = 3;   // stamps on either side
-  constexpr double kInterval = 0.75;  // half of one happens by chance in thousands of stamps
-  std::vector<double> level;
-  for (const Stamp& s : stamps) {
-    level.push_back(s.residual_s - slope * s.nominal_s);
+// Slips where stamps are jittery. A slip that is taken out changes the steps of its neighbours only:
+// the work grows with the number of stamps and slips, not with their product.
+class JitterySlips {
+ public:
+  JitterySlips(const Stamps& stamps, double slope, double interval_s)
+      : interval_s_(interval_s), steps_(stamps.size(), 0), slips_(stamps.size(), 0) {
+    for (const Stamp& s : stamps) {
+      level_.push_back(s.residual_s - slope * s.nominal_s);
+    }
+    look(level_, 0, 0, level_.size());
   }
-  std::vector<double> slips(stamps.size(), 0);
-  for (std::size_t round = 0; round < stamps.size(); ++round) {
-    std::size_t at = 0;
-    double most = kInterval * interval_s;
-    double height = 0;
-    for (std::size_t i = kLeast; i + kLeast <= level.size(); ++i) {
-      const double step = step_at(level, i);
-      if (std::abs(step) > most) {
-        most = std::abs(step);
-        at = i;
-        height = std::round(step / interval_s);
+
+  // The largest first, the earlier of two alike.
+  std::vector<double> run() {
+    for (std::size_t round = 0; round < slips_.size() && !queue_.empty();) {
+      const Candidate largest = queue_.top();
+      queue_.pop();
+      if (largest.size == std::abs(steps_[largest.at])) {
+        slips_[largest.at] += std::round(steps_[largest.at] / interval_s_);
+        look_about(largest.at);
+        ++round;
       }
     }
-    if (at == 0) {
-      break;
-    }
-    slips[at] += height;
-    for (std::size_t i = at; i < level.size(); ++i) {
-      level[i] -= height * interval_s;
+    return slips_;
+  }
+
+ private:
+  struct Candidate {
+    double size;
+    std::size_t at;
+    bool operator<(const Candidate& o) const { return size != o.size ? size < o.size : at > o.at; }
+  };
+
+  // The steps at [from, to), of levels from the stamp `first` on. What is in the queue and is the step
+  // no more is old.
+  void look(std::span<const double> level, std::size_t first, std::size_t from, std::size_t to) {
+    constexpr std::size_t kLeast = 3;   // stamps on either side
+    constexpr double kInterval = 0.75;  // half of one happens by chance in thousands of stamps
+    for (std::size_t i = std::max(from, kLeast); i < to && i + kLeast <= slips_.size(); ++i) {
+      steps_[i] = step_at(level, i - first);
+      if (std::abs(steps_[i]) > kInterval * interval_s_) {
+        queue_.push({std::abs(steps_[i]), i});
+      }
     }
   }
-  return slips;
-}
+
+  void look_about(std::size_t at) {
+    const std::size_t first = at - std::min(at, 2 * kAveraged);
+    const std::size_t end = std::min(level_.size(), at + 2 * kAveraged);
+    std::vector<double> level;
+    double shift = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      shift += slips_[i] * interval_s_;
+      level.push_back(level_[i] - shift);
+    }
+    look(level, first, at - std::min(at, kAveraged), std::min(end, at + kAveraged));
+  }
+
+  double interval_s_;
+  std::vector<double> level_;  // with all slips
+  std::vector<double> steps_;  // without those that were found
+  std::vector<double> slips_;
+  std::priority_queue<Candidate> queue_;
+};
 
 std::vector<double> slips_of(const Stamps& stamps, const CoarseRate& rate, double interval_s) {
-  return rate.jittery ? slips_in_jitter(stamps, rate.slope, interval_s)
+  return rate.jittery ? JitterySlips(stamps, rate.slope, interval_s).run()
                       : clear_slips(stamps, rate.slope, interval_s);
 }
 

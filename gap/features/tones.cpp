@@ -242,26 +242,53 @@ class ToneAnalysis {
     }
   }
 
-  // The clock's error relative to the protocol that makes one unbroken tone fit best. The last grid
-  // is so fine that what it leaves of a tone of 1 g is below the noise.
-  double best_even_drift() {
-    const auto n = static_cast<double>(y_.size());
-    const double reach = 0.006;                      // beyond any clock of the catalogue
-    const double step = 0.25 * 2 * M_PI / (n * w_);  // a quarter turn over the segment
-    const auto half = static_cast<int>(std::ceil(reach / step));
-    double best = 0;
-    even_cost_ = fit_piece(prefix_sums(y_, good_, w_).back()).squares;
-    for (int round = 0; round < 6; ++round) {
-      const double centre = best;
-      const double grid = step / std::pow(8.0, round);
-      for (int k = -(round == 0 ? half : 8); k <= (round == 0 ? half : 8); ++k) {
-        const double e = centre + k * grid;
-        const double squares = fit_piece(prefix_sums(y_, good_, w_ * (1 + e)).back()).squares;
-        if (squares < even_cost_) {
-          even_cost_ = squares;
-          best = e;
-        }
+  // What one unbroken tone, off by this share, leaves of the first `count` samples.
+  double even_squares(std::size_t count, double e) const {
+    const double w = w_ * (1 + e);
+    ToneSums sums;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (good_[i] != 0) {
+        sums.add(y_[i], w * static_cast<double>(i));
       }
+    }
+    return fit_piece(sums).squares;
+  }
+
+  // A grid of 2 half + 1 points about `centre`; the best that is better than `least`, which follows.
+  double best_on_grid(std::size_t count, double centre, double grid, int half,
+                      double& least) const {
+    double best = centre;
+    for (int k = -half; k <= half; ++k) {
+      const double e = centre + k * grid;
+      const double squares = even_squares(count, e);
+      if (squares < least) {
+        least = squares;
+        best = e;
+      }
+    }
+    return best;
+  }
+
+  // The clock's error relative to the protocol that makes one unbroken tone fit best. The last grid
+  // is so fine that what it leaves of a tone of 1 g is below the noise. The first one needs more
+  // points the longer the tone is: it is tried on a stretch, and then on eight times as much each.
+  double best_even_drift() {
+    constexpr std::size_t kStretch = 1U << 14U;  // longer than any tone of the protocols
+    constexpr int kFinerBy = 8;
+    const double reach = 0.006;  // beyond any clock of the catalogue
+    std::size_t count = std::min(y_.size(), kStretch);
+    // A quarter turn over what is tried.
+    const auto step = [&] { return 0.25 * 2 * M_PI / (static_cast<double>(count) * w_); };
+    even_cost_ = even_squares(count, 0);
+    auto half = static_cast<int>(std::ceil(reach / step()));
+    double best = best_on_grid(count, 0, step(), half, even_cost_);
+    while (count < y_.size()) {
+      count = std::min(y_.size(), kFinerBy * count);
+      even_cost_ = even_squares(count, best);
+      best = best_on_grid(count, best, step(), kFinerBy, even_cost_);
+    }
+    for (int round = 1; round < 6; ++round) {
+      best = best_on_grid(count, best, step() / std::pow(kFinerBy, round), kFinerBy, even_cost_);
     }
     return best;
   }

@@ -91,8 +91,8 @@ Diagnosis diagnose_records(const Request& request, const ProtocolKind& kind, con
   const Bundle& bundle = request.bundle;
   const std::vector<Block> blocks = blocks_of(bundle, records);
   if (blocks.empty()) {
-    return inconclusive(request, std::move(found), "no dwell of two unmasked seconds is left",
-                        std::move(out));
+    return inconclusive(request.options, std::move(found),
+                        "no dwell of two unmasked seconds is left", std::move(out));
   }
   if (records.clean.pose_error_g > kOtherPoses_g) {
     poses.wrong = true;
@@ -100,11 +100,6 @@ Diagnosis diagnose_records(const Request& request, const ProtocolKind& kind, con
                 "pose: the recording's axes do not follow the protocol's poses");
   }
   const std::size_t pose_count = poses_of(blocks);
-  if (pose_count < kLeastPoses) {
-    out.losses.push_back(
-        fmt::format("{} pose{} only: gains and offsets of the unit can't be told from effects",
-                    pose_count, pose_count == 1 ? "" : "s"));
-  }
 
   const Explanation explanation = explain(request, blocks, records.slow);
   found.append(judge_means(request, explanation, records.slow, found));
@@ -127,9 +122,17 @@ Diagnosis diagnose_records(const Request& request, const ProtocolKind& kind, con
   if (!found.alarms.empty()) {
     out.unknown.where = locate_unknown(request, records, explanation, found);
   }
+  if (pose_count < kLeastPoses) {
+    const std::string few =
+        fmt::format("{} pose{} only: gains and offsets of the unit can't be told from effects",
+                    pose_count, pose_count == 1 ? "" : "s");
+    // Two poses fit any gains and offsets, and what else is there.
+    if (found.effects.empty() && found.alarms.empty()) {
+      return inconclusive(request.options, std::move(found), few, std::move(out));
+    }
+    out.losses.push_back(few);
+  }
   finish(request, std::move(found), out);
-  // Two poses fit any gains and offsets, and what else is there.
-  out.inconclusive = out.verdict == Verdict::no_gap && pose_count < kLeastPoses;
   return out;
 }
 
@@ -143,7 +146,7 @@ Diagnosis diagnose(const Request& request) {
   PoseCheck poses = judge_poses(bundle, clean);
   if (poses.moving) {
     return inconclusive(
-        request, std::move(found),
+        request.options, std::move(found),
         "the unit moves inside the segments: the protocol's sample numbers are not of this "
         "recording",
         std::move(out));
@@ -152,7 +155,7 @@ Diagnosis diagnose(const Request& request) {
   NoiseSpectrum noise = noise_spectrum(bundle, clean);
   if (!noise.usable()) {
     return inconclusive(
-        request, std::move(found),
+        request.options, std::move(found),
         fmt::format(
             "too little of the recording lies still and unmasked to know even its noise: of "
             "{} samples {} are zero on all axes, {} hold one value and {} are clipped",

@@ -37,6 +37,14 @@ Json values(const std::vector<double>& list) {
 
 }  // namespace
 
+std::vector<NamedValue> EffectFinding::all_parameters() const {
+  std::vector<NamedValue> all = parameters;
+  for (const std::vector<NamedValue>& line : further_lines) {
+    all.insert(all.end(), line.begin(), line.end());
+  }
+  return all;
+}
+
 std::vector<std::string> uncertainty_texts(const NamedValue& parameter) {
   std::vector<std::string> texts;
   for (const double sd : parameter.sd) {
@@ -47,15 +55,11 @@ std::vector<std::string> uncertainty_texts(const NamedValue& parameter) {
 
 namespace {
 
-Json finding_json(const EffectFinding& finding) {
-  Json json;
-  json["name"] = finding.name;
-  json["probability"] = finite(finding.probability);
-  json["evidence_nats"] = finite(finding.nats);
+void add_parameters(const std::vector<NamedValue>& parameters, Json& json) {
   json["parameters"] = Json::object();
   json["standard_uncertainty"] = Json::object();
   json["form_uncertainty"] = Json::object();
-  for (const NamedValue& parameter : finding.parameters) {
+  for (const NamedValue& parameter : parameters) {
     json["parameters"][parameter.name] = values(parameter.value);
     if (!parameter.sd.empty()) {
       std::vector<double> sd = parameter.sd;
@@ -65,6 +69,20 @@ Json finding_json(const EffectFinding& finding) {
     }
     if (!parameter.form_sd.empty()) {
       json["form_uncertainty"][parameter.name] = values(parameter.form_sd);
+    }
+  }
+}
+
+Json finding_json(const EffectFinding& finding) {
+  Json json;
+  json["name"] = finding.name;
+  json["probability"] = finite(finding.probability);
+  json["evidence_nats"] = finite(finding.nats);
+  add_parameters(finding.parameters, json);
+  if (!finding.further_lines.empty()) {
+    json["further_lines"] = Json::array();
+    for (const std::vector<NamedValue>& line : finding.further_lines) {
+      add_parameters(line, json["further_lines"].emplace_back());
     }
   }
   json["held_out_gain_nats"] = finite(finding.held_out_gain_nats);
@@ -175,16 +193,22 @@ Json augmented_scenario(const Diagnosis& diagnosis) {
                  {"offset_g", diagnosis.unit.offset_g},
                  {"noise_mg", diagnosis.unit.noise_mg}}},
                {"effects", Json::array()}};
-  for (const EffectFinding& effect : diagnosis.effects) {
+  const auto add = [&](const std::string& effect, const std::vector<NamedValue>& parameters) {
     Json entry;
-    entry["name"] = effect.name;
+    entry["name"] = effect;
     entry["parameters"] = Json::object();
-    for (const NamedValue& parameter : effect.parameters) {
-      if (!is_derived(effect.name, parameter.name)) {
+    for (const NamedValue& parameter : parameters) {
+      if (!is_derived(effect, parameter.name)) {
         entry["parameters"][parameter.name] = values(parameter.value);
       }
     }
     json["effects"].push_back(std::move(entry));
+  };
+  for (const EffectFinding& effect : diagnosis.effects) {
+    add(effect.name, effect.parameters);
+    for (const std::vector<NamedValue>& line : effect.further_lines) {
+      add(effect.name, line);
+    }
   }
   return json;
 }

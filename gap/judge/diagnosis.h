@@ -53,6 +53,11 @@ struct EffectFinding {
   std::optional<double> bound = {};
   // Earlier units behind the sizes that were expected of it; 0: the catalogue's sizes.
   std::size_t learnt_from_units = 0;
+  // Parameters of each further line of the same kind, strongest first; of lines only.
+  std::vector<std::vector<NamedValue>> further_lines = {};
+
+  // For people: its parameters, and behind them those of its further lines.
+  std::vector<NamedValue> all_parameters() const;
 };
 
 struct UnknownPlace {

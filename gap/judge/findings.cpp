@@ -30,10 +30,10 @@ bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
 }
 
 // Adds what no step has judged, in the catalogue's order; strongest first.
-void complete(const Request& request, Findings& found) {
+void complete(const DiagnoseOptions& options, Findings& found) {
   for (const CatalogueEntry& entry : catalogue()) {
     const std::string name(entry.name);
-    if (request.allowed(name) && !contains(found.candidates, name)) {
+    if (is_allowed(options, name) && !contains(found.candidates, name)) {
       found.candidates.push_back(
           {.name = name, .probability = probability_of(kLogPriorEffect), .nats = kLogPriorEffect});
     }
@@ -85,6 +85,16 @@ double unknown_share(const Findings& found) {
     sd = std::max(sd, alarm.sd);
   }
   return 1 / (1 + std::exp(-(sd - kAlarm_sd) / kUnknownWidth_sd));
+}
+
+// Comparisons with what is no number are false: it would pass for no alarm and no gap.
+bool is_finite(const Findings& found, const GapSize& gap) {
+  const auto finite = [](const EffectFinding& f) {
+    return std::isfinite(f.nats) && std::isfinite(f.gap_mg2);
+  };
+  return std::ranges::all_of(found.candidates, finite) &&
+         std::ranges::all_of(found.effects, finite) && std::isfinite(gap.before_mg) &&
+         std::isfinite(gap.after_mg) && std::isfinite(gap.floor_mg);
 }
 
 }  // namespace
@@ -170,7 +180,7 @@ void Findings::append(Findings later) {
   join(effects, later.effects);
   join(candidates, later.candidates);
   join(alarms, later.alarms);
-  join(outside_means_mg2, later.outside_means_mg2);
+  join(outside_means, later.outside_means);
   worst_sd = std::max(worst_sd, later.worst_sd);
   bounds.merge(later.bounds);
 }
@@ -206,7 +216,19 @@ void set_shares(const Diagnosis& out, double matters_mg, std::vector<EffectFindi
 }
 
 void finish(const Request& request, Findings found, Diagnosis& out) {
-  complete(request, found);
+  if (!is_finite(found, out.gap)) {
+    out.gap = {};
+    out.where.clear();
+    out.next_segments.clear();
+    out.plots = {};
+    out = inconclusive(
+        request.options, std::move(found),
+        "a result is no finite number: times or values of the recording lie beyond what "
+        "can be computed",
+        std::move(out));
+    return;
+  }
+  complete(request.options, found);
   std::sort(found.alarms.begin(), found.alarms.end(),
             [](const Alarm& a, const Alarm& b) { return a.sd > b.sd; });
   constexpr std::size_t kMostPlaces = 8;
@@ -237,24 +259,26 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
   out.candidates = std::move(found.candidates);
 }
 
-Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,
+Diagnosis inconclusive(const DiagnoseOptions& options, Findings found, const std::string& why,
                        Diagnosis out) {
   constexpr double kProbability = 0.5;  // nothing is known
   out.inconclusive = true;
   out.losses.push_back(why);
   // A recording that is held or zero throughout has several possible causes: none is named.
-  found.effects.clear();
+  out.effects.clear();
   for (EffectFinding& candidate : found.candidates) {
-    candidate.nats = std::min(candidate.nats, 0.0);
-    candidate.probability = std::min(candidate.probability, kProbability);
+    // What is no number is as likely as not.
+    candidate.nats = std::isnan(candidate.nats) ? 0 : std::min(candidate.nats, 0.0);
+    candidate.probability = std::min(kProbability, candidate.probability);
   }
-  complete(request, found);
+  complete(options, found);
   out.candidates = std::move(found.candidates);
   out.verdict = Verdict::unexplained;
   out.unknown = {true, kProbability, {why}, {}};
+  out.not_observable.clear();
   for (const CatalogueEntry& entry : catalogue()) {
-    if (request.allowed(std::string(entry.name))) {
-      out.not_observable.emplace_back(entry.name, entry.segment);
+    if (is_allowed(options, std::string(entry.name))) {
+      out.not_observable.emplace_back(entry.name, entry.segment.empty() ? "none" : entry.segment);
     }
   }
   return out;

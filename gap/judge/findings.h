@@ -20,12 +20,17 @@
 
 namespace sixpoint::gap {
 
+// False for an effect that the options take out of the catalogue.
+inline bool is_allowed(const DiagnoseOptions& options, const std::string& effect) {
+  return options.without.count(effect) == 0;
+}
+
 // What is to be diagnosed. Refers to both, which must outlive it.
 struct Request {
   const Bundle& bundle;
   const DiagnoseOptions& options;
 
-  bool allowed(const std::string& effect) const { return options.without.count(effect) == 0; }
+  bool allowed(const std::string& effect) const { return is_allowed(options, effect); }
   double lsb_mg() const { return 1000 / bundle.accel_scale_lsb_per_g; }
   double segments() const { return static_cast<double>(bundle.segments.size()); }
 };
@@ -37,6 +42,12 @@ struct Alarm {
   std::vector<UnknownPlace> places = {};  // that it is about, beside those of locate_unknown()
 };
 
+// What an effect adds to the gap that the means do not show.
+struct OutsideMeans {
+  std::string effect;
+  double mg2 = 0;  // mean square per axis
+};
+
 struct Findings {
   std::vector<EffectFinding> effects;     // accepted ones
   std::vector<EffectFinding> candidates;  // all that were judged
@@ -44,8 +55,8 @@ struct Findings {
   double worst_sd = 0;  // of all tests and other causes, alarms or not
   // EffectFinding::bound of every effect that has one, judged or not.
   std::map<std::string, double> bounds;
-  // Mean squares per axis of what effects add to the gap that the means do not show.
-  std::vector<double> outside_means_mg2;
+  // Of all that was found, named or not.
+  std::vector<OutsideMeans> outside_means;
 
   // Sets the probability; an effect that is not allowed is left out.
   void add(const Request& request, EffectFinding finding);
@@ -106,15 +117,21 @@ void set_shares(const Diagnosis& out, double matters_mg, std::vector<EffectFindi
 // | kAlarm_sd                                | 0.49            | 0.75                        |
 // | far above                                | 0.95            | 0.5                         |
 //
-// | alarms | effects | verdict          |
-// |--------|---------|------------------|
-// | none   | none    | no_gap           |
-// | none   | some    | explained        |
-// | some   | some    | partly_explained |
-// | some   | none    | unexplained      |
+// | evidence and gap  | alarms | effects | verdict           |
+// |-------------------|--------|---------|-------------------|
+// | finite numbers    | none   | none    | no_gap            |
+// | finite numbers    | none   | some    | explained         |
+// | finite numbers    | some   | some    | partly_explained  |
+// | finite numbers    | some   | none    | unexplained       |
+// | one is not finite | either | either  | by inconclusive() |
 void finish(const Request& request, Findings found, Diagnosis& out);
-// The answer where the recording does not allow a diagnosis. Names no effect.
-Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,
+// The answer where the recording does not allow a diagnosis, for whatever reason (`why`), of every
+// kind of recording. It keeps what `out` says of the recording itself.
+//
+// | verdict     | effects | unknown, candidates   | not_observable |
+// |-------------|---------|-----------------------|----------------|
+// | unexplained | none    | at most even odds     | the catalogue  |
+Diagnosis inconclusive(const DiagnoseOptions& options, Findings found, const std::string& why,
                        Diagnosis out);
 
 }  // namespace sixpoint::gap

@@ -97,7 +97,7 @@ void undo_mode(const ForwardState& s, double common, Nuisances& nuisances) {
     square += std::pow(1000 * (1 - common), 2) / 3 +
               std::pow(s.offset_mg[static_cast<Eigen::Index>(a)], 2);
   }
-  nuisances.found.outside_means_mg2.push_back(square / 3);
+  nuisances.found.outside_means.push_back({"filter_mismatch", square / 3});
 }
 
 // The common gain, of a unit without offsets, from which on down a mode is accepted.
@@ -161,7 +161,7 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool ju
   const bool mismatch = request.allowed(f.name) && f.nats > kAccept_nats;
   if (mismatch) {
     undo_mode(s, mode.common, out);
-    f.gap_mg2 = out.found.outside_means_mg2.back();
+    f.gap_mg2 = out.found.outside_means.back().mg2;
   } else if (chi > kFarOut_chi) {
     out.found.alarm(z, "nuisance: gains or offsets of the unit lie far outside their priors");
   }

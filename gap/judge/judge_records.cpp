@@ -62,7 +62,7 @@ void judge_low_pass(const Request& request, const Response& response,
     const double h = l.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
     gap_mg2 += tone_gap_mg2(request, s, h);
   }
-  found.outside_means_mg2.push_back(gap_mg2);
+  found.outside_means.push_back({"bandwidth", gap_mg2});
   found.add(request, {.name = "bandwidth",
                       .nats = gain_nats - kResponseCost_nats + kLogPriorEffect,
                       .parameters = {{"corner_hz",
@@ -83,7 +83,7 @@ void judge_resonance(const Request& request, const Response& response,
     const Segment& s = request.bundle.segments[tone.segment];
     gap_mg2 += there ? tone_gap_mg2(request, s, resonance_gain(s.vibration->frequency_hz, r)) : 0;
   }
-  found.outside_means_mg2.push_back(gap_mg2);
+  found.outside_means.push_back({"soft_mount", gap_mg2});
   found.add(
       request,
       {.name = "soft_mount",
@@ -150,25 +150,24 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
         fmt::format("spectrum: the line at {:.2f} Hz comes and goes", line.frequency_hz),
         noise_places(request));
   }
-  std::map<std::string, EffectFinding> by_name;  // the strongest line of each
+  std::map<std::string, EffectFinding> by_name;  // by the strongest line of each
   for (const SpectralLine& line : lines.list) {
     const double power_mg2 = line.vector_mg.squaredNorm() / 2;
     lines.power_mg2 += power_mg2;
-    lines.found.outside_means_mg2.push_back(line.vector_mg.squaredNorm() / 6);
     std::string name = "floor_vibration";
     std::string other = "electrical_line";
     if (!line.in_lab) {
       name.swap(other);
     }
-    if (!request.allowed(name)) {
-      if (line.decidable || !request.allowed(other)) {
-        lines.found.alarm(nats_to_sd(line.gain_nats),
-                          fmt::format("spectrum: a line at {:.2f} Hz, {:.2f} mg", line.frequency_hz,
-                                      line.vector_mg.norm()));
-        continue;
-      }
-    }
     const bool own = request.allowed(name);
+    const bool has_name = own || (!line.decidable && request.allowed(other));
+    lines.found.outside_means.push_back({own || !has_name ? name : other, power_mg2 / 3});
+    if (!has_name) {
+      lines.found.alarm(nats_to_sd(line.gain_nats),
+                        fmt::format("spectrum: a line at {:.2f} Hz, {:.2f} mg", line.frequency_hz,
+                                    line.vector_mg.norm()));
+      continue;
+    }
     const auto size_sd = [&](Eigen::Index a) {
       return std::hypot(line.sd_mg, kFormShare * line.vector_mg[a]);
     };
@@ -186,9 +185,12 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
     if (!line.decidable) {
       f.confounded_with.push_back(other);
     }
-    f.gap_mg2 = line.vector_mg.squaredNorm() / 6;
-    EffectFinding& strongest = by_name.emplace(f.name, f).first->second;
-    strongest.gap_mg2 += strongest.nats == f.nats ? 0 : f.gap_mg2;
+    f.gap_mg2 = power_mg2 / 3;
+    const auto [strongest, is_first] = by_name.emplace(f.name, f);
+    if (!is_first) {
+      strongest->second.gap_mg2 += f.gap_mg2;
+      strongest->second.further_lines.push_back(std::move(f.parameters));
+    }
   }
   for (auto& [name, f] : by_name) {
     lines.found.add(request, std::move(f));
@@ -276,7 +278,7 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   settling.unexplained = there && !named;
   if (named) {
     f.gap_mg2 = std::pow(1000 * amplitude, 2) * mode.decay_s / 4 / kDwell_s * kRingingShare;
-    settling.found.outside_means_mg2.push_back(f.gap_mg2);
+    settling.found.outside_means.push_back({f.name, f.gap_mg2});
   }
   if (named || !there) {
     settling.found.add(request, std::move(f));

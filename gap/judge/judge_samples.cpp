@@ -38,7 +38,7 @@ void judge_turned_axes(const Request& request, const CleanSamples& clean, Findin
   }
   const double nats = kPerTurn_nats * clean.axes_gain_g;
   const double gap_mg2 = std::pow(1000 * clean.axes_gain_g, 2);
-  found.outside_means_mg2.push_back(gap_mg2);
+  found.outside_means.push_back({"axis_rotation", gap_mg2});
   if (request.allowed("axis_rotation")) {
     found.add(request, {.name = "axis_rotation",
                         .nats = nats,
@@ -81,7 +81,7 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
     effect.nats = per_sample_nats * static_cast<double>(samples) + kLogPriorEffect;
     effect.held_out_gain_nats = effect.nats - cost_nats;
     effect.gap_mg2 = share_of(samples, all) * per_share_mg2;
-    found.outside_means_mg2.push_back(effect.gap_mg2);
+    found.outside_means.push_back({effect.name, effect.gap_mg2});
     if (request.allowed(effect.name)) {
       found.add(request, std::move(effect));
     } else {

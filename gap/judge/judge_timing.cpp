@@ -142,7 +142,7 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
   const double nats = std::max(crystal, wrong) + std::log1p(std::exp(-std::abs(crystal - wrong))) -
                       std::log(2.0) + kLogPriorEffect;
   const double gap_mg2 = nats > kAccept_nats ? clock_gap_mg2(request, tones, ppm) : 0;
-  found.outside_means_mg2.push_back(gap_mg2);
+  found.outside_means.push_back({"clock_error", gap_mg2});
   if (!request.allowed("clock_error") && nats > kAccept_nats) {
     found.alarm(std::abs(z), fmt::format("timing: the sample clock is off by {:.0f} ppm", ppm));
   } else if (std::abs(ppm) < kPossibleClock_ppm) {
@@ -185,7 +185,7 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
     const double nats = count == 0 ? (by_host ? kNoSlip_nats : kLogPriorEffect - 1)
                                    : kPerSlip_nats * static_cast<double>(count) + kLogPriorEffect;
     const double gap_mg2 = rate * 1e6;  // 1 g rms for each sample out of place
-    found.outside_means_mg2.push_back(gap_mg2);
+    found.outside_means.push_back({name, gap_mg2});
     if (count > 0 && !request.allowed(name)) {
       found.alarm(kSlipAlarm_sd, fmt::format("timing: {} samples {}", count, words));
     } else if (samples > 0) {
@@ -348,7 +348,7 @@ void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& ti
     tone.in_phase_mg *= std::exp(f * f / 2);
     gap_mg2 += std::pow(f * tone.in_phase_mg[tone.axis], 2) / 2 / 3 / request.segments();
   }
-  timing.found.outside_means_mg2.push_back(gap_mg2);
+  timing.found.outside_means.push_back({"jitter", gap_mg2});
   timing.found.add(
       request,
       {.name = "jitter",

@@ -37,13 +37,18 @@ BeforeAfter spectrum_feature(const Records& records, const Findings& found) {
   const double bins =
       3.0 * static_cast<double>(std::max<std::size_t>(1, records.noise.frequency_hz.size()));
   double line_nats = 0;
+  double left_nats = 0;  // of lines that have no name
   for (const SpectralLine& line : records.lines.list) {
     line_nats += line.gain_nats;
+    left_nats += found.accepted(line.in_lab ? "floor_vibration" : "electrical_line") ||
+                         (!line.decidable &&
+                          found.accepted(line.in_lab ? "electrical_line" : "floor_vibration"))
+                     ? 0
+                     : line.gain_nats;
   }
-  const bool named = found.accepted("floor_vibration") || found.accepted("electrical_line");
   const auto noise = [&](double sd) { return 1 + std::max(0.0, sd) * std::sqrt(2 / bins); };
   return {root(noise(records.response.noise_flat_sd) + 2 * line_nats / bins),
-          root(noise(records.response.noise_left_sd) + (named ? 0 : 2 * line_nats / bins))};
+          root(noise(records.response.noise_left_sd) + 2 * left_nats / bins)};
 }
 
 // Sum of 2 nats per number over the accepted effects of these families, times `scale`, from
@@ -85,24 +90,24 @@ GapSize measure_gap(const Records& records, const Explanation& explanation, cons
   }
   const Explanation::HeldOut held = explanation.held_out(named);
   double outside_mg2 = 0;
-  for (const double mg2 : found.outside_means_mg2) {
-    outside_mg2 += mg2;
+  double left_mg2 = 0;  // of what nothing named explains
+  for (const OutsideMeans& outside : found.outside_means) {
+    outside_mg2 += outside.mg2;
+    left_mg2 += named.count(outside.effect) != 0 ? 0 : outside.mg2;
   }
+  // With what the means do not show, in mg and in standard deviations.
+  const auto with = [](double mg, double more_mg2) { return std::sqrt(mg * mg + more_mg2); };
+  const auto sigma_with = [&](double sigma, double more_mg2) {
+    return held.floor_mg > 0 ? with(sigma, more_mg2 / std::pow(held.floor_mg, 2)) : 0;
+  };
   GapSize gap;
   gap.floor_mg = held.floor_mg;
-  gap.before_mg = std::sqrt(held.before_mg * held.before_mg + outside_mg2);
-  gap.before_sigma =
-      held.floor_mg > 0
-          ? std::sqrt(std::pow(held.before_sigma, 2) + outside_mg2 / std::pow(held.floor_mg, 2))
-          : 0;
-  double explained_nats = 0;
-  for (const EffectFinding& e : found.effects) {
-    explained_nats += e.nats;
-  }
+  gap.before_mg = with(held.before_mg, outside_mg2);
+  gap.before_sigma = sigma_with(held.before_sigma, outside_mg2);
   // What is not explained stays: without any effect nothing is closed.
-  const bool open = explained_nats == 0;
-  gap.after_mg = open ? gap.before_mg : held.after_mg;
-  gap.after_sigma = open ? gap.before_sigma : held.after_sigma;
+  const bool open = found.effects.empty();
+  gap.after_mg = open ? gap.before_mg : with(held.after_mg, left_mg2);
+  gap.after_sigma = open ? gap.before_sigma : sigma_with(held.after_sigma, left_mg2);
   // Three rows are one independent mean; relative uncertainty of a root mean square: 1 / sqrt(2 n).
   const double half = kTwoSided95 * gap.after_mg / std::sqrt(2.0 * std::max(1, held.rows / 3));
   gap.after_interval_mg = {std::max(0.0, gap.after_mg - half), gap.after_mg + half};

@@ -46,10 +46,12 @@ Multiplier multiplier_of(const Later& later, const Findings& found) {
   return {1 / by->value[0], by->sd[0] / (by->value[0] * by->value[0])};
 }
 
-void multiply(const Multiplier& by, NamedValue& parameter) {
-  for (std::size_t i = 0; i < parameter.value.size(); ++i) {
-    parameter.sd[i] = std::hypot(by.value * parameter.sd[i], by.sd * parameter.value[i]);
-    parameter.value[i] *= by.value;
+void multiply(const Multiplier& by, std::string_view name, std::vector<NamedValue>& parameters) {
+  for (NamedValue& parameter : parameters) {
+    for (std::size_t i = 0; parameter.name == name && i < parameter.value.size(); ++i) {
+      parameter.sd[i] = std::hypot(by.value * parameter.sd[i], by.sd * parameter.value[i]);
+      parameter.value[i] *= by.value;
+    }
   }
 }
 
@@ -60,10 +62,12 @@ void undo_later_effects(Findings& found) {
     const Multiplier by = multiplier_of(changed.later, found);
     for (auto* list : {&found.effects, &found.candidates}) {
       for (EffectFinding& effect : *list) {
-        for (NamedValue& parameter : effect.parameters) {
-          if (effect.name == changed.effect && parameter.name == changed.parameter) {
-            multiply(by, parameter);
-          }
+        if (effect.name != changed.effect) {
+          continue;
+        }
+        multiply(by, changed.parameter, effect.parameters);
+        for (std::vector<NamedValue>& line : effect.further_lines) {
+          multiply(by, changed.parameter, line);
         }
       }
     }

@@ -141,6 +141,34 @@ void plot_allan(const Request& request, const Records& records, const Fit& fit, 
   }
 }
 
+// The name under which most was recorded at rest: there a line shows best.
+std::string longest_at_rest(const Bundle& bundle) {
+  std::map<std::string, std::size_t> samples;
+  std::string longest;
+  for (const Segment& segment : bundle.segments) {
+    if (segment.at_rest()) {
+      samples[segment.name] += segment.samples;
+      longest = samples[segment.name] > samples[longest] ? segment.name : longest;
+    }
+  }
+  return longest;
+}
+
+// The axis, and the segment behind the move, that gravity moves most: there ringing shows best.
+std::pair<int, std::string> largest_move(const Bundle& bundle) {
+  std::pair<int, std::string> place;
+  double most_g = 0;
+  for (const Segment& segment : bundle.segments) {
+    int axis = 0;
+    const double move_g = segment.approach_g.cwiseAbs().maxCoeff(&axis);
+    if (segment.at_rest() && segment.may_ring() && move_g > most_g) {
+      most_g = move_g;
+      place = {axis, segment.name};
+    }
+  }
+  return place;
+}
+
 }  // namespace
 
 Residuals locate_residuals(const Request& request, const Records& records,
@@ -170,16 +198,18 @@ Residuals locate_residuals(const Request& request, const Records& records,
     out.where.push_back({key.first, key.second, cell.factor, std::sqrt(cell.square_mg2 / cell.n),
                          std::sqrt(cell.square / cell.n)});
   }
+  const std::string quiet = longest_at_rest(request.bundle);
   for (const SpectralLine& line : records.lines.list) {
     for (int a = 0; a < 3; ++a) {
       const double size_mg = std::abs(line.vector_mg[a]);
-      out.where.push_back({a, "still", fmt::format("frequency {:.2f} Hz", line.frequency_hz),
+      out.where.push_back({a, quiet, fmt::format("frequency {:.2f} Hz", line.frequency_hz),
                            size_mg / M_SQRT2, size_mg / std::max(1e-6, line.sd_mg)});
     }
   }
   const StepResponse& step = records.settling.step;
   if (found.accepted("settling") || step.left_without_sd > kAlarm_sd) {
-    out.where.push_back({0, "faces", "time since move", 1000 * step.amplitude / 2,
+    const auto [axis, segment] = largest_move(request.bundle);
+    out.where.push_back({axis, segment, "time since move", 1000 * step.amplitude / 2,
                          step.amplitude / std::max(1e-9, step.mode.amplitude_sd)});
   }
   std::sort(out.where.begin(), out.where.end(),

@@ -166,7 +166,8 @@ void find_axes(const Bundle& bundle, CleanSamples& clean) {
   }
   clean.axes_decidable = second - best > kApart_g;
   clean.axes_gain_g = as_is - best;
-  clean.axes_turned = clean.axes_gain_g > kApart_g && best < kFits_g;
+  // Where others fit alike, none of them is known: the recording is in other poses, and that is all.
+  clean.axes_turned = clean.axes_decidable && clean.axes_gain_g > kApart_g && best < kFits_g;
   clean.pose_error_g = clean.axes_turned ? best : as_is;
   if (clean.axes_turned) {
     clean.axis_matrix = chosen;

@@ -62,6 +62,11 @@ struct CleanSamples {
   std::size_t count_usable(std::size_t first, std::size_t count) const;
   double mean_mg(std::size_t first, std::size_t count, std::size_t axis) const;
 
+  // | another signed permutation is clearly better | and clearly the best  | axes        |
+  // |----------------------------------------------|-----------------------|-------------|
+  // | no                                           | either                | as they are |
+  // | yes                                          | no (`axes_decidable`) | as they are |
+  // | yes                                          | yes                   | turned back |
   bool axes_turned = false;
   Eigen::Matrix3i axis_matrix = Eigen::Matrix3i::Identity();  // maps the right axes to the stored
   // How much worse, in g rms over the poses, the untouched axes fit than the best signed

@@ -50,7 +50,7 @@ std::string effects_table(const std::vector<EffectFinding>& list, const char* ca
   for (std::size_t i = 0; i < std::min(limit, list.size()); ++i) {
     const EffectFinding& e = list[i];
     std::string parameters;
-    for (const NamedValue& p : e.parameters) {
+    for (const NamedValue& p : e.all_parameters()) {
       parameters += fmt::format("{} = {:.4g}", p.name, fmt::join(p.value, ", "));
       parameters += p.sd.empty()
                         ? "; "

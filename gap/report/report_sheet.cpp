@@ -96,7 +96,7 @@ class Sheet {
       text(kMargin, y, 11,
            fmt::format("{}: p {:.3f}, held out {:+.0f} nats", e.name, e.probability,
                        e.held_out_gain_nats));
-      for (const NamedValue& p : e.parameters) {
+      for (const NamedValue& p : e.all_parameters()) {
         if (p.value.size() <= 3) {
           y += 13;
           text(kMargin + 10, y, 10, fmt::format("{} {:.3g}", p.name, fmt::join(p.value, "  ")),

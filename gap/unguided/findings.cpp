@@ -7,10 +7,6 @@
 
 namespace sixpoint::gap {
 
-bool is_allowed(const DiagnoseOptions& options, const std::string& name) {
-  return options.without.count(name) == 0;
-}
-
 void set_sigmas(GapSize& gap) {
   gap.before_sigma = gap.before_mg / gap.floor_mg;
   gap.after_sigma = gap.after_mg / gap.floor_mg;
@@ -21,6 +17,16 @@ double closed_fraction(const GapSize& gap) {
 }
 
 void finish(Diagnosis& diagnosis, const DiagnoseOptions& options) {
+  // Six faces and back: 1.7 minutes, 12 placements of 0.135 nats each.
+  diagnosis.next_segments.push_back(
+      {"faces", 1.7, 0.135 * 12, {"misalignment", "second_order", "settling"}});
+  if (diagnosis.inconclusive) {
+    Findings found;
+    found.candidates = std::move(diagnosis.candidates);
+    const std::string why = diagnosis.unknown.why.front();
+    diagnosis = inconclusive(options, std::move(found), why, std::move(diagnosis));
+    return;
+  }
   const std::vector<EffectFinding> judged = diagnosis.candidates;
   for (const CatalogueEntry& entry : catalogue()) {
     const std::string name(entry.name);
@@ -41,9 +47,6 @@ void finish(Diagnosis& diagnosis, const DiagnoseOptions& options) {
         std::sqrt(std::max(0.0, std::pow(gap.after_mg, 2) - std::pow(gap.floor_mg, 2)));
   }
   set_shares(diagnosis, options.matters_mg, diagnosis.effects, diagnosis.candidates);
-  // Six faces and back: 1.7 minutes, 12 placements of 0.135 nats each.
-  diagnosis.next_segments.push_back(
-      {"faces", 1.7, 0.135 * 12, {"misalignment", "second_order", "settling"}});
   diagnosis.unknown.probability = diagnosis.unknown.present ? 0.95 : 0.1;
   diagnosis.verdict =
       diagnosis.unknown.present

@@ -15,8 +15,6 @@
 
 namespace sixpoint::gap {
 
-// False for an effect that the options take out of the catalogue.
-bool is_allowed(const DiagnoseOptions& options, const std::string& name);
 // before_sigma and after_sigma from the milligravities and the floor.
 void set_sigmas(GapSize& gap);
 // The share of the square of the gap that is explained.
@@ -25,11 +23,14 @@ double closed_fraction(const GapSize& gap);
 // Lists the effects that were not judged as not observable, sets the shares of the gap of those that
 // were, suggests the next segment, and sets the verdict:
 //
-//   something unknown | effects found | verdict
-//   yes               | none          | unexplained
-//   yes               | some          | partly_explained
-//   no                | none          | no_gap
-//   no                | some          | explained
+//   too little data | something unknown | effects found | verdict
+//   no              | yes               | none          | unexplained
+//   no              | yes               | some          | partly_explained
+//   no              | no                | none          | no_gap
+//   no              | no                | some          | explained
+//   yes             | either            | either        | by inconclusive(), of judge/findings.h
+//
+// Where `inconclusive` is set, unknown.why says why.
 void finish(Diagnosis& diagnosis, const DiagnoseOptions& options);
 
 }  // namespace sixpoint::gap

@@ -413,7 +413,7 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
   const Means means = directions_of(recording.rests);
   if (means.empty()) {
     out.inconclusive = true;
-    out.losses.push_back("the recording holds no still period of four seconds");
+    out.unknown.why = {"the recording holds no still period of four seconds"};
   } else {
     judge_lengths(means, recording, options, out);
   }

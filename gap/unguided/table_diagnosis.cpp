@@ -168,10 +168,10 @@ std::optional<Fits> fit_placements(std::vector<Placement> placements, Diagnosis&
   const auto held_out = directions >= kFewestDirections ? hold_out(placements) : std::nullopt;
   if (!cross || !square || !held_out) {
     out.inconclusive = true;
-    out.losses.push_back(
+    out.unknown.why = {
         fmt::format("{} directions at rest, which do not settle nine constants; rest the sensor "
                     "in sixteen and more, all round",
-                    directions));
+                    directions)};
     return std::nullopt;
   }
   return Fits{*square, *cross, *held_out, std::move(means)};

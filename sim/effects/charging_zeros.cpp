@@ -17,14 +17,16 @@ class ChargingZeros final : public Effect {
         random_(random) {}
   void on_recording(const RecordingPlan& plan) override {
     if (start_s_ < 0) {
-      runs_ = SampleRuns(draw_runs(plan, seconds_ * plan.rate_hz, false, random_));
+      runs_ =
+          SampleRuns(draw_runs("charging_zeros", plan, seconds_ * plan.rate_hz, false, random_));
     } else {
-      runs_ = SampleRuns(
-          {SampleRun{static_cast<std::uint64_t>(std::ceil(std::min(1e12, start_s_ * plan.rate_hz))),
-                     static_cast<std::uint64_t>(
-                         std::ceil(std::min(1e12, (start_s_ + seconds_) * plan.rate_hz)))}});
+      runs_ = SampleRuns(std::vector{
+          SampleRun{static_cast<std::uint64_t>(std::ceil(std::min(1e12, start_s_ * plan.rate_hz))),
+                    static_cast<std::uint64_t>(
+                        std::ceil(std::min(1e12, (start_s_ + seconds_) * plan.rate_hz)))}});
     }
   }
+  Status problem() const override { return runs_.problem(); }
   void on_firmware(SimulatedBlock& block) override {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (runs_.contain(block.first_sample + i)) {

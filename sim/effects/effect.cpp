@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <map>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -102,6 +104,13 @@ std::vector<std::unique_ptr<Effect>> make_effects(const std::vector<EffectSpec>&
   return effects;
 }
 
+Status check_effects(const std::vector<std::unique_ptr<Effect>>& effects) {
+  for (const auto& effect : effects) {
+    SIXPOINT_CHECK(effect->problem());
+  }
+  return {};
+}
+
 Eigen::Matrix3d rotation_by_deg(const std::vector<double>& rotation_vector_deg) {
   const Eigen::Vector3d vector =
       Eigen::Vector3d(rotation_vector_deg[0], rotation_vector_deg[1], rotation_vector_deg[2]) *
@@ -142,38 +151,84 @@ void RareSamples::draw() {
   }
 }
 
-std::vector<SampleRun> draw_runs(const RecordingPlan& plan, double samples, bool at_rest,
-                                 Random& random) {
-  const double per_second = std::max(1.0, std::round(plan.rate_hz));
-  const auto length = static_cast<double>(plan.length());
-  double left_s = std::min(std::round(samples / per_second), std::floor(length / per_second / 2));
-  const double longest_s = at_rest ? 20 : std::max(1.0, std::ceil(left_s / 3));
-  std::vector<SampleRun> runs;
-  constexpr int kMostTries = 100'000;
-  for (int attempt = 0; left_s >= 1 && attempt < kMostTries; ++attempt) {
-    const double wanted_s = std::min(
-        left_s, std::max(1.0, std::round(longest_s * random.uniform(at_rest ? 0.05 : 0.6, 1))));
-    const double begin = std::floor(random.uniform() * length / per_second) * per_second;
-    const SampleRun run{static_cast<std::uint64_t>(begin),
-                        static_cast<std::uint64_t>(begin + wanted_s * per_second)};
-    const bool inside =
-        !at_rest || plan.rests.empty()
-            ? run.end <= plan.length()
-            : std::any_of(plan.rests.begin(), plan.rests.end(), [&](const auto& rest) {
-                return run.begin >= rest.first_sample + 1 &&
-                       run.end <= rest.first_sample + rest.samples;
-              });
-    const bool apart = std::none_of(runs.begin(), runs.end(), [&](const SampleRun& other) {
-      return run.begin <= other.end && other.begin <= run.end;
-    });
-    if (inside && apart) {
-      runs.push_back(run);
-      left_s -= wanted_s;
+namespace {
+
+// Seconds of the recording, by number, that a run may hold: it stays within one stretch.
+struct Stretch {
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+};
+
+std::vector<Stretch> stretches_of(const RecordingPlan& plan, bool at_rest,
+                                  std::uint64_t per_second) {
+  if (!at_rest || plan.rests.empty()) {
+    return {{0, plan.length() / per_second}};
+  }
+  std::vector<Stretch> stretches;
+  for (const RecordingPlan::Stretch& rest : plan.rests) {
+    // Behind its first sample, which is what is held.
+    const std::uint64_t first = rest.first_sample / per_second + 1;
+    const std::uint64_t end = (rest.first_sample + rest.samples) / per_second;
+    if (first < end) {
+      stretches.push_back({first, end - first});
     }
   }
-  std::sort(runs.begin(), runs.end(),
-            [](const SampleRun& a, const SampleRun& b) { return a.begin < b.begin; });
-  return runs;
+  return stretches;
+}
+
+}  // namespace
+
+Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const RecordingPlan& plan,
+                                         double samples, bool at_rest, Random& random) {
+  const auto per_second = static_cast<std::uint64_t>(std::max(1.0, std::round(plan.rate_hz)));
+  const auto length_s = static_cast<double>(plan.length()) / static_cast<double>(per_second);
+  double asked_s = std::max(1.0, std::round(samples / static_cast<double>(per_second)));
+  if (!at_rest) {
+    asked_s = std::min(asked_s, std::max(1.0, std::floor(length_s / 2)));
+  }
+  const std::vector<Stretch> stretches = stretches_of(plan, at_rest, per_second);
+  double room_s = 0;
+  for (const Stretch& stretch : stretches) {
+    room_s += static_cast<double>(stretch.count);
+  }
+  const double longest_s = at_rest ? 20 : std::max(1.0, std::ceil(asked_s / 3));
+  double left_s = samples > 0 ? asked_s : 0;
+  std::map<std::uint64_t, std::uint64_t> runs;  // begin and end, in seconds
+  constexpr int kMostFailures = 100'000;        // one after another: nothing more fits in
+  for (int failures = 0; left_s >= 1 && room_s > 0 && failures < kMostFailures; ++failures) {
+    const double wanted_s = std::min(
+        left_s, std::max(1.0, std::round(longest_s * random.uniform(at_rest ? 0.05 : 0.6, 1))));
+    auto at = static_cast<std::uint64_t>(random.uniform() * room_s);
+    auto stretch = stretches.begin();
+    for (; at >= stretch->count; ++stretch) {
+      at -= stretch->count;
+    }
+    const std::uint64_t begin = stretch->first + at;
+    const std::uint64_t end = begin + static_cast<std::uint64_t>(wanted_s);
+    const auto next = runs.lower_bound(begin);
+    const bool apart = (next == runs.end() || end < next->first) &&
+                       (next == runs.begin() || std::prev(next)->second < begin);
+    if (apart && end <= stretch->first + stretch->count) {
+      runs.emplace(begin, end);
+      left_s -= wanted_s;
+      failures = 0;
+    }
+  }
+  if (left_s >= 1) {
+    return fail(
+        ErrorCode::configuration,
+        fmt::format("the effect '{}' is to hold {:.0f} s, and there is room for {:.0f} s of it",
+                    effect, asked_s, asked_s - left_s),
+        {},
+        at_rest ? "it holds whole seconds of one rest, behind the rest's first sample: ask for "
+                  "less, or give longer rests"
+                : "ask for less, or give a longer recording");
+  }
+  std::vector<SampleRun> drawn;
+  for (const auto& [begin, end] : runs) {
+    drawn.push_back({begin * per_second, end * per_second});
+  }
+  return drawn;
 }
 
 }  // namespace sixpoint::sim

@@ -153,6 +153,9 @@ class Effect {
  public:
   virtual ~Effect() = default;
   virtual void on_recording(const RecordingPlan& /*plan*/) {}
+  // configuration where the recording that on_recording() was told of has no room for the effect: it
+  // would be a recording without it.
+  virtual Status problem() const { return {}; }
   virtual void on_placement(const Placement& /*placement*/) {}
   virtual void on_tone(Tone& /*tone*/) const {}
   virtual void on_sampling(SimulatedBlock& /*block*/) {}
@@ -188,6 +191,9 @@ struct EffectSpec {
   const EffectKind* kind = nullptr;
   ParameterSet values;  // complete
 };
+
+// The first problem() among them.
+Status check_effects(const std::vector<std::unique_ptr<Effect>>& effects);
 
 // Running effects in the order of `specs`, each with a stream of its own.
 std::vector<std::unique_ptr<Effect>> make_effects(const std::vector<EffectSpec>& specs,

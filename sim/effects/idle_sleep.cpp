@@ -6,27 +6,38 @@
 
 namespace sixpoint::sim {
 
+namespace {
+
+class IdleSleep final : public Effect {
+ public:
+  IdleSleep(const ParameterSet& values, Random random)
+      : fraction_(std::clamp(values.at("fraction")[0], 0.0, 1.0)), random_(random) {}
+  void on_recording(const RecordingPlan& plan) override {
+    const double samples = fraction_ * static_cast<double>(plan.length());
+    runs_ = SampleRuns(draw_runs("idle_sleep", plan, samples, true, random_));
+  }
+  Status problem() const override { return runs_.problem(); }
+  void on_firmware(SimulatedBlock& block) override {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (runs_.contain(block.first_sample + i) && block.first_sample + i > 0) {
+        block.stored[i] = last_;
+      }
+      last_ = block.stored[i];
+    }
+  }
+
+ private:
+  double fraction_;
+  Random random_;
+  SampleRuns runs_;
+  gt3x::Counts last_{};
+};
+
+}  // namespace
+
 EffectKind idle_sleep_kind() {
   return effect_kind(
-      "idle_sleep", Stage::firmware, "holds the last value at rest",
-      [](const ParameterSet& values, Random random) {
-        auto made = std::make_unique<Parts>();
-        auto runs = std::make_shared<SampleRuns>();
-        made->recording = [runs, fraction = std::clamp(values.at("fraction")[0], 0.0, 1.0),
-                           random](const RecordingPlan& plan) mutable {
-          const double samples = fraction * static_cast<double>(plan.length());
-          *runs = SampleRuns(draw_runs(plan, samples, true, random));
-        };
-        made->firmware = [runs, last = gt3x::Counts{}](SimulatedBlock& block) mutable {
-          for (std::size_t i = 0; i < block.size(); ++i) {
-            if (runs->contain(block.first_sample + i) && block.first_sample + i > 0) {
-              block.stored[i] = last;
-            }
-            last = block.stored[i];
-          }
-        };
-        return made;
-      },
+      "idle_sleep", Stage::firmware, "holds the last value at rest", make_effect<IdleSleep>,
       {parameter("fraction", "1", {0.05}, 0, 0.9,
                  "share of all samples; runs of 1 s and more (vendor: idle sleep mode)")});
 }

@@ -139,16 +139,30 @@ struct SampleRun {
   std::uint64_t end = 0;
 };
 
-// Runs of whole seconds that together hold about `samples`, in order and apart: up to six, or, at
-// rest only, as many as it takes of 1 to 20 s, each within one rest.
-std::vector<SampleRun> draw_runs(const RecordingPlan& plan, double samples, bool at_rest,
-                                 Random& random);
+// Runs of whole seconds that together hold about `samples`, in order and apart, a second at least where
+// any are asked for. configuration where they have no room.
+//
+// | at_rest | runs                                         | most that is held      |
+// |---------|----------------------------------------------|------------------------|
+// | no      | up to six                                    | half of the recording  |
+// | yes     | as many as it takes of 1 to 20 s, each       | what has room          |
+// |         | within one rest, behind its first sample     |                        |
+Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const RecordingPlan& plan,
+                                         double samples, bool at_rest, Random& random);
 
 // Runs that are asked about by rising sample numbers.
 class SampleRuns {
  public:
   SampleRuns() = default;
-  explicit SampleRuns(std::vector<SampleRun> runs) : runs_(std::move(runs)) {}
+  explicit SampleRuns(Result<std::vector<SampleRun>> drawn) {
+    if (drawn) {
+      runs_ = *std::move(drawn);
+    } else {
+      problem_ = fail(drawn.error());
+    }
+  }
+  // That they could not be drawn.
+  const Status& problem() const { return problem_; }
   bool contain(std::uint64_t sample) {
     while (next_ < runs_.size() && sample >= runs_[next_].end) {
       ++next_;
@@ -158,6 +172,7 @@ class SampleRuns {
 
  private:
   std::vector<SampleRun> runs_;
+  Status problem_;
   std::size_t next_ = 0;
 };
 

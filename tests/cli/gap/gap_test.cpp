@@ -69,6 +69,18 @@ TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsOwnProtocol) {
   EXPECT_FALSE(found_again["unknown"]["present"]) << found_again["unknown"];
 }
 
+// A unit of 341 LSB/g is simulated again as one.
+TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsScale) {
+  std::ofstream(path("s.json"))
+      << R"({"seed": 7, "rate_hz": 50, "protocol": "production", "unit": {"accel_scale_lsb_per_g": 341}})";
+  ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o", path("bundle")}).exit_code, 0);
+  const auto found = run({"gap", "diagnose", path("bundle"), "--scenario-out", path("again.json")});
+  ASSERT_EQ(found.exit_code, 0) << found.out << found.err;
+  ASSERT_EQ(run({"simulate", "--scenario", path("again.json"), "-o", path("again")}).exit_code, 0);
+  std::ifstream in(path("again/protocol.json"));
+  EXPECT_EQ(nlohmann::json::parse(in)["accel_scale_lsb_per_g"], 341);
+}
+
 // Two poses fit any gains and offsets.
 TEST_F(CommandTest, TooFewPosesAreNoAnswer) {
   std::ofstream(path("s.json"))
@@ -82,6 +94,7 @@ TEST_F(CommandTest, TooFewPosesAreNoAnswer) {
   const auto found = run({"gap", "diagnose", path("bundle"), "--json"});
   EXPECT_EQ(found.exit_code, 2) << found.out;
   EXPECT_TRUE(found.json()["inconclusive"]);
+  EXPECT_EQ(found.json()["verdict"], "unexplained");
   EXPECT_EQ(found.json()["gap"]["before"]["rms_mg"], found.json()["gap"]["after"]["rms_mg"]);
 }
 

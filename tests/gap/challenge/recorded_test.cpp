@@ -10,6 +10,7 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "gap/recording/bundle.h"
+#include "gt3x/recording.h"
 #include "gt3x_made_log.h"
 #include "repair/made_recording.h"
 #include "repair/triage/survey.h"
@@ -31,15 +32,20 @@ class RecordedTrial : public ::testing::Test {
  protected:
   void SetUp() override { write_bundle(R"("still")"); }
 
-  void write_bundle(const std::string& last_kind) {
+  static Bytes log_of(std::int16_t lsb_per_g) {
     Bytes log;
     for (std::uint32_t second = 0; second < 30; ++second) {
       gt3x::Counts counts{};
-      counts[second / 10] = 256;
+      counts[second / 10] = lsb_per_g;
       Bytes payload;
       gt3x::append_activity2(payload, std::vector<gt3x::Counts>(100, counts));
       append_record(log, gt3x::RecordType::activity2, gt3x::tests::kStart + second, payload);
     }
+    return log;
+  }
+
+  void write_bundle(const std::string& last_kind) {
+    const Bytes log = log_of(256);
     ASSERT_OK(files_.make_folders("b"));
     ASSERT_OK(
         gt3x::tests::put_recording(files_, "b/recording.gt3x", log, gt3x::tests::made_info("100")));
@@ -162,6 +168,25 @@ TEST_F(RecordedTrial, TheRestOfTheBundleIsCopied) {
   ASSERT_OK(files_.remove("b/host_clock.csv"));
   ASSERT_OK(write_recorded_trial(files_, "b", "without", {}, 1));
   EXPECT_FALSE(files_.info("without/host_clock.csv"));
+}
+
+// The header of a trial is that of the recording: its scale and its firmware, too.
+TEST_F(RecordedTrial, TheHeaderIsTheRecordings) {
+  const auto text = read_file(files_, "b/protocol.json");
+  ASSERT_OK(text);
+  std::string protocol(text->begin(), text->end());
+  protocol.replace(protocol.find("256"), 3, "341");
+  put("b/protocol.json", protocol);
+  gt3x::Info info = gt3x::tests::made_info("100");
+  info.set("Acceleration Scale", "341.0");
+  info.set("Firmware", "1.9.2");
+  ASSERT_OK(files_.remove("b/recording.gt3x"));
+  ASSERT_OK(gt3x::tests::put_recording(files_, "b/recording.gt3x", log_of(341), info));
+  ASSERT_OK(write_recorded_trial(files_, "b", "trial", {effect("tilt")}, 1));
+  auto recording = gt3x::Recording::open(files_, "trial/recording.gt3x");
+  ASSERT_OK(recording);
+  EXPECT_EQ(recording->info().get("Firmware"), "1.9.2");
+  EXPECT_EQ(recording->info().get("Acceleration Scale"), "341.0");
 }
 
 TEST_F(RecordedTrial, OnlyBundlesAtRestAreTaken) {

@@ -133,6 +133,36 @@ TEST(Forward, TempcosAndWarmUpBend) {
 
 // Three blocks of a recording of two hours: at a quarter of it the sine of one period is 1, the
 // cosine of two is -1.
+// Oracle: the simulator's law, exp(-max(0, t) / tau) (sim/effects/warm_up.cpp), averaged over the block
+// by a sum of small steps. Times are since power-on, and a protocol may have them before it.
+TEST(Forward, AWarmUpBeginsAtPowerOnAndStaysFinite) {
+  struct Case {
+    double middle_s, seconds;
+  };
+  ForwardState s;
+  s.warm_up_mg = {4, 0, 0};
+  s.quick_warm_up_mg = {0, 1, 0};
+  s.warm_up_tau_s = 75;
+  for (const Case& c : {Case{-12'000, 10}, Case{-1e9, 10}, Case{2, 10}, Case{-4, 10}, Case{100, 0},
+                        Case{200, 10}, Case{34'500, 69'000}, Case{1e9, 10}}) {
+    Block block = dwell(Eigen::Matrix3d::Identity());
+    block.middle_s = c.middle_s;
+    block.seconds = c.seconds;
+    const auto mean = [&](double tau_s) {
+      constexpr int kSteps = 500'000;
+      double sum = 0;
+      for (int k = 0; k < kSteps; ++k) {
+        const double t_s = c.middle_s + c.seconds * ((k + 0.5) / kSteps - 0.5);
+        sum += std::exp(-std::max(0.0, t_s) / tau_s) / kSteps;
+      }
+      return sum;
+    };
+    const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+    EXPECT_NEAR(y[0], 4 * mean(75), 1e-6) << c.middle_s;
+    EXPECT_NEAR(y[1], mean(75.0 / 4), 1e-6) << c.middle_s;
+  }
+}
+
 TEST(Forward, ADriftRipples) {
   std::vector<Block> blocks(3, dwell(Eigen::Matrix3d::Identity()));
   blocks[0].middle_s = 600;

@@ -1,5 +1,7 @@
 #include "gap/features/timing.h"
 
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "gap/made_bundle.h"
@@ -56,6 +58,28 @@ TEST(HostTiming, AClockThatIsSetIsBounded) {
   const HostTiming timing = host_timing(bundle);
   ASSERT_EQ(timing.slips.size(), 1U);
   EXPECT_EQ(timing.slips[0].lost, 1'000'000);
+}
+
+// Oracle: the slips that are put in. Stamps that jitter, 40,000 of them, a slip in every fiftieth
+// second; all but the first and the last two, which have too few neighbours, are found.
+TEST(HostTiming, ManySlipsAmongJitteringStampsAreFound) {
+  constexpr std::size_t kSeconds = 40'000;
+  Bundle bundle;
+  Segment segment;
+  segment.name = "still";
+  segment.samples = 100 * kSeconds;
+  bundle.segments = {segment};
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> stamp(-0.004, 0.004);
+  double late_s = 0;
+  for (std::size_t i = 0; i < kSeconds; ++i) {
+    late_s += i % 50 == 25 ? (i % 100 == 25 ? 0.05 : -0.02) : 0;
+    bundle.host_clock.sample_index.push_back(100 * i);
+    bundle.host_clock.host_time_s.push_back(static_cast<double>(i) + late_s + stamp(random));
+  }
+  const HostTiming timing = host_timing(bundle);
+  EXPECT_EQ(timing.lost, 400U * 5);
+  EXPECT_EQ(timing.repeated, 400U * 2);
 }
 
 TEST(HostTiming, NothingWithoutStamps) {

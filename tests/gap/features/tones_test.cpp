@@ -8,17 +8,17 @@ namespace sixpoint::gap {
 namespace {
 
 Bundle one_tone(double frequency_hz, double amplitude_g,
-                const std::function<double(std::size_t)>& slip) {
+                const std::function<double(std::size_t)>& slip, std::size_t samples = 1000) {
   Bundle bundle;
   Segment segment;
   segment.name = "shaker";
   segment.kind = Segment::Kind::vibration;
-  segment.samples = 1000;
+  segment.samples = samples;
   segment.starts_placement = false;
   segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), frequency_hz, amplitude_g};
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal(0, 1);
-  for (std::size_t n = 0; n < 1000; ++n) {
+  for (std::size_t n = 0; n < samples; ++n) {
     const double t = (static_cast<double>(n) + slip(n)) / 100;
     const double z = 1 + amplitude_g * std::cos(2 * M_PI * frequency_hz * t + 1);
     bundle.samples.push_back({static_cast<std::int16_t>(std::lround(normal(random))),
@@ -70,6 +70,18 @@ TEST(Tones, AnEvenDriftIsNoRowOfSlips) {
   const ToneFit fit = fit_tones(slipped, clean_samples(slipped), {}).front();
   ASSERT_EQ(fit.slips.size(), 1U);
   EXPECT_EQ(fit.slips[0].steps, 1);
+}
+
+// Oracle: the drift that is put in, of tones that are longer than any of a protocol. The search for it
+// begins on a stretch of them.
+TEST(Tones, AnEvenDriftOfALongToneIsFound) {
+  for (const double ppm : {-2'500.0, -61.0, 0.7, 5'000.0}) {
+    const auto drifting = [&](std::size_t n) { return static_cast<double>(n) * ppm * 1e-6; };
+    const Bundle bundle = one_tone(40, 0.6, drifting, 200'000);
+    const ToneFit fit = fit_tones(bundle, clean_samples(bundle), {}).front();
+    EXPECT_TRUE(fit.slips.empty()) << ppm;
+    EXPECT_NEAR(fit.frequency_ppm, ppm, 5 * fit.frequency_sd_ppm);
+  }
 }
 
 // What is left of a tone of 11 g that is clipped at 8 g shows its curve: y = z + K3 z^3 at a level of

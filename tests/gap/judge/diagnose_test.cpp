@@ -250,6 +250,92 @@ TEST(Diagnose, RecordingsThatSayNothingAreInconclusive) {
   }
 }
 
+// Two poses fit any gains and offsets: the answer is that of every recording that says too little.
+TEST(Diagnose, TwoPosesAreInconclusive) {
+  Bundle two = tests::made_production({});
+  two.segments.resize(2);
+  const auto d = diagnose(two);
+  ASSERT_OK(d);
+  EXPECT_FALSE(d->usable());
+  EXPECT_EQ(d->verdict, Verdict::unexplained);
+  EXPECT_EQ(d->unknown.probability, 0.5);
+  EXPECT_EQ(d->losses.back(),
+            "2 poses only: gains and offsets of the unit can't be told from effects");
+  EXPECT_EQ(std::ranges::count(d->losses, d->losses.back()), 1);
+}
+
+// A unit that lies upside down in its only pose: many turns of the axes fit alike, none is named.
+TEST(Diagnose, OnePoseUpsideDownIsNoRotationOfAxes) {
+  Bundle one = tests::made_production({.long_samples = 6000});
+  one.segments = {one.segments.back()};
+  one.segments[0].rotation = -one.segments[0].rotation;
+  one.segments[0].rotation.col(1) *= -1;
+  const auto d = diagnose(one);
+  ASSERT_OK(d);
+  for (const EffectFinding& effect : d->effects) {
+    EXPECT_NE(effect.name, "axis_rotation") << d->brief();
+  }
+  ASSERT_TRUE(d->unknown.present);
+  EXPECT_EQ(d->unknown.why.front(),
+            "pose: the recording's axes do not follow the protocol's poses");
+}
+
+// Oracle: the same recording by another clock. Times count from power-on, and a host's clock may
+// begin where it likes.
+TEST(Diagnose, TimesBeforePowerOnLeaveTheAnswer) {
+  const auto tilted = [](double shift_s) {
+    const Eigen::AngleAxisd tilt(0.36 * M_PI / 180, Eigen::Vector3d::UnitX());
+    Bundle bundle = tests::made_production({}, [&](const Segment& s, double) {
+      return Eigen::Vector3d(s.rotation * (tilt * Eigen::Vector3d::UnitZ()));
+    });
+    for (Segment& segment : bundle.segments) {
+      segment.host_start_s += shift_s;
+    }
+    for (auto* times_s : {&bundle.host_clock.host_time_s, &bundle.temperature.host_time_s}) {
+      for (double& time_s : *times_s) {
+        time_s += shift_s;
+      }
+    }
+    return bundle;
+  };
+  for (const double shift_s : {0.0, -12'000.0, -1e6}) {
+    const auto d = diagnose(tilted(shift_s));
+    ASSERT_OK(d);
+    EXPECT_TRUE(d->usable()) << d->brief();
+    EXPECT_NE(d->verdict, Verdict::no_gap) << shift_s;
+    const NamedValue* tilt = parameter_of(*d, "tilt", "rotation_vector_deg");
+    ASSERT_NE(tilt, nullptr) << shift_s << ": " << d->brief();
+    EXPECT_NEAR(std::abs(tilt->value[0]), 0.36, 0.03);
+    EXPECT_GT(d->gap.before_mg, 1);
+  }
+}
+
+// gap.after counts named effects only: lost samples that nobody names stay in it.
+TEST(Diagnose, WhatIsWithheldStaysInTheGap) {
+  const auto bundle = tests::simulated(
+      {{"schema", "sixpoint/scenario/1"},
+       {"seed", 5},
+       {"protocol", "production"},
+       {"rate_hz", 50},
+       {"effects",
+        {{{"name", "tilt"}, {"parameters", {{"rotation_vector_deg", {0.3, 0.2, 0}}}}},
+         {{"name", "dropped_samples"}, {"parameters", {{"rate", 0.005}}}}}}});
+  ASSERT_OK(bundle);
+  const auto all = diagnose(*bundle, {});
+  ASSERT_OK(all);
+  const auto part = diagnose(*bundle, {.without = {"dropped_samples"}});
+  ASSERT_OK(part);
+  EXPECT_EQ(part->verdict, Verdict::partly_explained) << part->brief();
+  const double lost_mg2 = 0.005 * 1e6;  // 1 g rms for each, by convention
+  EXPECT_NEAR(part->gap.after_mg, std::sqrt(lost_mg2), 0.3 * std::sqrt(lost_mg2));
+  EXPECT_NEAR(part->unknown.size_mg, part->gap.after_mg, 0.1);
+  EXPECT_LT(part->gap.closed_fraction, 0.1);
+  for (const EffectFinding& effect : part->effects) {
+    EXPECT_LT(effect.share_of_gap, 0.1) << effect.name;
+  }
+  EXPECT_GT(all->gap.closed_fraction, 0.9);
+}
+
 TEST(Diagnose, NoTemperatureAndNoHostClockAreBorne) {
   Bundle bundle = tests::made_production({});
   bundle.temperature = {};

@@ -173,5 +173,26 @@ TEST(Diagnosis, AugmentedScenarioHoldsTheUnitAndNothingDerived) {
   EXPECT_EQ(scenario->protocol->effects[0].values.at("angle_deg"), std::vector<double>{0});
 }
 
+// Two lines are two effects of the simulator, and one of the answer.
+TEST(Diagnosis, FurtherLinesAreEffectsOfTheScenario) {
+  gap::Diagnosis d;
+  d.unit.noise_mg = {3.9, 3.9, 5.5};
+  d.effects = {named("floor_vibration")};
+  d.effects[0].parameters = {{"vector_mg", {1, 2, 3}, {0.1, 0.1, 0.1}}, {"frequency_hz", {12}, {}}};
+  d.effects[0].further_lines = {
+      {{"vector_mg", {3, 2, 1}, {0.1, 0.1, 0.1}}, {"frequency_hz", {17}, {}}}};
+  const auto scenario = sim::parse_scenario(gap::augmented_scenario(d).dump());
+  ASSERT_OK(scenario);
+  ASSERT_EQ(scenario->protocol->effects.size(), 2U);
+  EXPECT_EQ(scenario->protocol->effects[0].values.at("frequency_hz"), std::vector<double>{12});
+  EXPECT_EQ(scenario->protocol->effects[1].kind->name, "floor_vibration");
+  EXPECT_EQ(scenario->protocol->effects[1].values.at("vector_mg"), (std::vector<double>{3, 2, 1}));
+  const auto json = d.to_json();
+  ASSERT_EQ(json["effects"].size(), 1U);
+  ASSERT_EQ(json["effects"][0]["further_lines"].size(), 1U);
+  EXPECT_EQ(json["effects"][0]["further_lines"][0]["parameters"]["frequency_hz"], 17);
+  EXPECT_EQ(json["effects"][0]["further_lines"][0]["standard_uncertainty"]["vector_mg"][0], 0.1);
+}
+
 }  // namespace
 }  // namespace sixpoint

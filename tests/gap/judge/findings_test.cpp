@@ -1,5 +1,7 @@
 #include "gap/judge/findings.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "gap/explain/catalogue.h"
@@ -154,10 +156,10 @@ TEST(Findings, TestsAlarmBeyondTheirThreshold) {
   EXPECT_EQ(found.alarms.front().where, "loud");
   Findings more;
   more.test(3, "later");
-  more.outside_means_mg2 = {4};
+  more.outside_means = {{"wrap", 4}};
   found.append(std::move(more));
   EXPECT_EQ(found.worst_sd, 5.6);
-  EXPECT_EQ(found.outside_means_mg2.size(), 1U);
+  EXPECT_EQ(found.outside_means.size(), 1U);
 }
 
 // Quantiles of chi-square from tables (Abramowitz and Stegun, table 26.8).
@@ -189,6 +191,31 @@ TEST(Findings, VerdictFromEffectsAndAlarms) {
   }
 }
 
+// The last row of the table of finish(): what is no number passes every comparison.
+TEST(Findings, WhatIsNoFiniteNumberIsNoAnswer) {
+  const Asked asked;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  for (const double wrong : {kNone, kEndless, -kEndless}) {
+    for (const bool in_gap : {false, true}) {
+      Findings found;
+      found.add(asked.request, {.name = "drift", .nats = in_gap ? 9 : wrong});
+      Diagnosis out;
+      out.gap.after_mg = in_gap ? wrong : 0;
+      out.not_observable.emplace_back("tilt", "yaw");
+      finish(asked.request, found, out);
+      EXPECT_FALSE(out.usable()) << wrong << in_gap;
+      EXPECT_EQ(out.verdict, Verdict::unexplained);
+      EXPECT_TRUE(out.effects.empty());
+      EXPECT_EQ(out.gap.after_mg, 0) << "nothing is said of it";
+      EXPECT_EQ(out.not_observable.size(), catalogue().size()) << "each once";
+      for (const EffectFinding& candidate : out.candidates) {
+        EXPECT_LE(candidate.probability, 0.5) << candidate.name;
+      }
+    }
+  }
+}
+
 TEST(Findings, BeyondTheDatasheetIsSaid) {
   const Asked asked;
   Findings found;
@@ -207,9 +234,12 @@ TEST(Findings, InconclusiveNamesNothing) {
   const Asked asked{{.without = {"tilt"}}};
   Findings found;
   found.add(asked.request, {.name = "idle_sleep", .nats = 1000});
-  const Diagnosis d = inconclusive(asked.request, found, "too little", {});
+  const Diagnosis d = inconclusive(asked.options, found, "too little", {});
   EXPECT_FALSE(d.usable());
   EXPECT_TRUE(d.effects.empty());
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_TRUE(d.unknown.present);
+  EXPECT_EQ(d.unknown.probability, 0.5);
   EXPECT_EQ(d.unknown.why.front(), "too little");
   EXPECT_EQ(d.not_observable.size(), catalogue().size() - 1);
   for (const EffectFinding& candidate : d.candidates) {

@@ -24,7 +24,40 @@ TEST(JudgeRecords, ALineOfTheSensorIsElectrical) {
   EXPECT_NEAR(std::abs(line->parameters[0].value[2]), 2.4, 0.3) << "mg on z";
   ASSERT_EQ(lines.list.size(), 1U);
   EXPECT_NEAR(lines.power_mg2, 4.5, 0.8) << "half of the square of 3 mg";
-  EXPECT_NEAR(lines.found.outside_means_mg2.at(0), lines.power_mg2 / 3, 1e-9);
+  EXPECT_NEAR(lines.found.outside_means.at(0).mg2, lines.power_mg2 / 3, 1e-9);
+}
+
+// Oracle: the lines that are put in. Of two of one kind both count and both stand in the effect.
+TEST(JudgeRecords, ASecondLineOfTheSameKindStandsInTheEffect) {
+  const auto shaken = tests::made_production({}, [](const Segment& s, double t) {
+    const double phase = static_cast<double>(s.first_sample);
+    const Eigen::Vector3d strong =
+        0.004 * std::sin(2 * M_PI * 17.3 * t + phase) * Eigen::Vector3d(0.6, 0, 0.8);
+    const Eigen::Vector3d weak =
+        0.003 * std::sin(2 * M_PI * 12 * t + 2 * phase) * Eigen::Vector3d(0, 0.6, 0.8);
+    return Eigen::Vector3d(s.rotation.col(2) + s.rotation * (strong + weak));
+  });
+  const Made made(shaken);
+  const auto judged = [](const Made& of) {
+    return judge_lines(of.request, of.clean, of.noise, code_statistics(of.bundle, of.clean)).found;
+  };
+  const Findings found = judged(made);
+  const EffectFinding* line = effect(found, "floor_vibration");
+  ASSERT_NE(line, nullptr);
+  EXPECT_NEAR(line->parameters[1].value[0], 17.3, 0.05) << "the stronger one is first";
+  ASSERT_EQ(line->further_lines.size(), 1U);
+  EXPECT_EQ(line->further_lines[0][0].name, "vector_mg");
+  EXPECT_NEAR(std::abs(line->further_lines[0][0].value[2]), 2.4, 0.3) << "mg on z";
+  EXPECT_NEAR(line->further_lines[0][1].value[0], 12, 0.05);
+  EXPECT_NEAR(line->gap_mg2, (16.0 + 9.0) / 6, 0.5) << "a sine's mean square, over three axes";
+  ASSERT_EQ(line->all_parameters().size(), 4U);
+  EXPECT_EQ(line->all_parameters()[3].value, line->further_lines[0][1].value);
+  ASSERT_EQ(found.outside_means.size(), 2U);
+  EXPECT_NEAR(found.outside_means[0].mg2 + found.outside_means[1].mg2, line->gap_mg2, 1e-9);
+  // Without the name both are unknown, and both stay in the gap under it.
+  const Findings stripped = judged(Made(shaken, {.without = {"floor_vibration"}}));
+  EXPECT_EQ(stripped.alarms.size(), 2U);
+  EXPECT_EQ(stripped.outside_means[1].effect, "floor_vibration");
 }
 
 // Findings on a vibration of the floor whose amplitude differs between dwells, 3 mg times a share.

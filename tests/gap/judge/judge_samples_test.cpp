@@ -26,8 +26,8 @@ TEST(JudgeMarks, EvidenceIsPerSample) {
   // Half of 3040 counts on x, 1536 on y, at 256 per g.
   EXPECT_NEAR(effect(found, "saturation")->parameters[0].value[0], (1520 + 1536) / 2.0 / 256,
               1e-12);
-  EXPECT_EQ(found.outside_means_mg2.size(), 3U);
-  EXPECT_NEAR(found.outside_means_mg2[0], 333'333 * 200.0 / 18'000, 1e-9);
+  EXPECT_EQ(found.outside_means.size(), 3U);
+  EXPECT_NEAR(found.outside_means[0].mg2, 333'333 * 200.0 / 18'000, 1e-9);
   EXPECT_TRUE(found.alarms.empty());
 }
 

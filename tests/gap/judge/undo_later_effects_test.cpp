@@ -19,8 +19,10 @@ const EffectFinding kLine = {.name = "floor_vibration",
                                             {"frequency_hz", {20}, {0.002}}}};
 
 TEST(UndoLaterEffects, AWrongModeIsDividedOut) {
+  EffectFinding two_lines = kLine;
+  two_lines.further_lines = {{{"vector_mg", {0.4, 0, 0}, {0.08, 0.08, 0.08}}}};
   Findings found = measured({{.name = "filter_mismatch", .parameters = {{"gain", {0.8}, {0.008}}}},
-                             kLine,
+                             two_lines,
                              {.name = "settling", .parameters = {{"amplitude", {0.04}, {0.003}}}}});
   undo_later_effects(found);
   const NamedValue& ringing = effect(found, "settling")->parameters[0];
@@ -29,6 +31,7 @@ TEST(UndoLaterEffects, AWrongModeIsDividedOut) {
   const EffectFinding* line = effect(found, "floor_vibration");
   EXPECT_DOUBLE_EQ(line->parameters[0].value[1], -2);
   EXPECT_EQ(line->parameters[1].value[0], 20) << "a gain changes no frequency";
+  EXPECT_DOUBLE_EQ(line->further_lines[0][0].value[0], 0.5);
   EXPECT_EQ(found.candidates[1].parameters[0].value, line->parameters[0].value);
 }
 

@@ -38,6 +38,49 @@ bool is_there(const std::vector<UnknownPlace>& places, int axis, const std::stri
   });
 }
 
+// A line, and ringing after moves: all places are segments that the recording has, and the ringing
+// is on an axis that gravity leaves or comes to.
+TEST(LocateResiduals, AllPlacesAreSegmentsOfTheRecording) {
+  const Bundle bundle = tests::made_production({}, [](const Segment& s, double t) {
+    const double ring = 0.04 * std::exp(-t / 0.4) * std::cos(2 * M_PI * 6 * t);
+    const double line_g = 0.003 * std::sin(2 * M_PI * 12 * t + static_cast<double>(s.first_sample));
+    return Eigen::Vector3d(s.rotation.col(2) + ring * s.approach_g +
+                           line_g * Eigen::Vector3d(0.6, 0, 0.8));
+  });
+  const auto diagnosis = diagnose(bundle);
+  ASSERT_OK(diagnosis);
+  int lines = 0;
+  int ringing = 0;
+  for (const Location& place : diagnosis->where) {
+    EXPECT_TRUE(std::ranges::any_of(bundle.segments, [&](const Segment& segment) {
+      return segment.name == place.segment;
+    })) << place.segment;
+    lines += place.factor.starts_with("frequency ") ? 1 : 0;
+    ringing += place.factor == "time since move" ? 1 : 0;
+  }
+  EXPECT_EQ(lines, 3);
+  EXPECT_EQ(ringing, 1);
+}
+
+// Moves along y alone, under a name of its own: there it rings.
+TEST(LocateResiduals, RingingIsOnTheAxisThatMoves) {
+  Bundle bundle = tests::made_production({}, [](const Segment& s, double t) {
+    const double ring = 0.04 * std::exp(-t / 0.4) * std::cos(2 * M_PI * 6 * t);
+    return Eigen::Vector3d(s.rotation.col(2) + ring * s.approach_g);
+  });
+  for (Segment& segment : bundle.segments) {
+    segment.name = "turned over";
+    segment.approach_g[0] /= 2;
+    segment.approach_g[2] /= 2;
+  }
+  const auto diagnosis = diagnose(bundle);
+  ASSERT_OK(diagnosis);
+  const auto place = std::ranges::find(diagnosis->where, "time since move", &Location::factor);
+  ASSERT_NE(place, diagnosis->where.end()) << diagnosis->brief();
+  EXPECT_EQ(place->axis, 1);
+  EXPECT_EQ(place->segment, "turned over");
+}
+
 // The zero of z moves by 8 mg between two runs of segments: z shows it, x and y do not.
 TEST(LocateUnknown, AZeroThatMovesIsOnItsAxis) {
   const Bundle bundle = tests::made_production({}, [](const Segment& s, double) {

@@ -30,6 +30,26 @@ TEST(Clean, TurnedAxesAreFoundAndTurnedBack) {
   EXPECT_TRUE(clean_samples(right).axes_decidable);
 }
 
+// The table of axes_turned. Of one pose that is not the protocol's many permutations fit alike: none is
+// known, and nothing is turned.
+TEST(Clean, AxesThatOnePoseLeavesOpenAreLeftAsTheyAre) {
+  Bundle one = tests::made_production({});
+  const auto up_z = std::ranges::find_if(
+      one.segments, [](const Segment& segment) { return segment.rotation.col(2)[2] > 0.9; });
+  ASSERT_NE(up_z, one.segments.end());
+  one.segments = {*up_z};
+  EXPECT_FALSE(clean_samples(one).axes_decidable);
+  EXPECT_FALSE(clean_samples(one).axes_turned);
+  for (gt3x::Counts& counts : one.samples) {
+    counts[2] = static_cast<std::int16_t>(-counts[2]);
+  }
+  const CleanSamples upside_down = clean_samples(one);
+  EXPECT_FALSE(upside_down.axes_decidable);
+  EXPECT_FALSE(upside_down.axes_turned);
+  EXPECT_EQ(upside_down.samples, one.samples);
+  EXPECT_NEAR(upside_down.pose_error_g, 2, 0.1) << "it lies upside down";
+}
+
 TEST(Clean, ZerosAndHoldsAreMaskedToTheSample) {
   Bundle bundle = tests::made_production({});
   std::fill(bundle.samples.begin() + 2500, bundle.samples.begin() + 2800, gt3x::Counts{});

@@ -27,6 +27,22 @@ TEST(Findings, VerdictByWhatWasFound) {
   }
 }
 
+// The table's last row: the answer is that of every other recording that says too little.
+TEST(Findings, TooLittleDataIsNoVerdictOfItsOwn) {
+  Diagnosis diagnosis;
+  diagnosis.inconclusive = true;
+  diagnosis.unknown.why = {"no still period"};
+  diagnosis.effects = diagnosis.candidates = {finding_of("offset_tempco")};
+  finish(diagnosis, {});
+  EXPECT_EQ(diagnosis.verdict, Verdict::unexplained);
+  EXPECT_TRUE(diagnosis.inconclusive);
+  EXPECT_TRUE(diagnosis.effects.empty());
+  EXPECT_TRUE(diagnosis.unknown.present);
+  EXPECT_EQ(diagnosis.unknown.probability, 0.5);
+  EXPECT_EQ(diagnosis.losses, std::vector<std::string>{"no still period"});
+  EXPECT_FALSE(diagnosis.next_segments.empty()) << "what would say more";
+}
+
 TEST(Findings, WhatWasNotJudgedIsNotObservable) {
   DiagnoseOptions options;
   options.without = {"drift"};

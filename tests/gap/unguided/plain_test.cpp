@@ -135,6 +135,21 @@ TEST(Plain, KnownMismatchInARealRecordingIsFoundAndMeasured) {
   EXPECT_EQ(right, 5);
 }
 
+// A unit that is never at rest: nothing is known of it, and that is no "no gap".
+TEST(Plain, WithoutRestThereIsNoAnswer) {
+  MemoryEnv memory;
+  const auto scenario = sim::parse_scenario(
+      R"({"seed": 4, "motions": [{"kind": "shaker", "duration_s": 60, "amplitude_g": 0.8}]})");
+  ASSERT_OK(scenario);
+  ASSERT_OK(sim::write_recording(memory.files, "a.gt3x", *scenario));
+  const auto d = diagnose_plain(memory.files, "a.gt3x");
+  ASSERT_OK(d);
+  EXPECT_FALSE(d->usable());
+  EXPECT_EQ(d->verdict, Verdict::unexplained);
+  EXPECT_EQ(d->unknown.probability, 0.5);
+  EXPECT_EQ(d->brief(), "nothing can be said: the recording holds no still period of four seconds");
+}
+
 TEST(Plain, MissingFileIsNoInput) {
   EXPECT_FAILS(diagnose_plain(posix_env().files, "/nonexistent/a.gt3x"), ErrorCode::no_input);
 }

@@ -84,6 +84,8 @@ TEST(TableDiagnosis, TooLittleIsInconclusive) {
     const auto d = diagnosed_table(table_of(made, 3));
     ASSERT_OK(d);
     EXPECT_TRUE(d->inconclusive) << directions;
+    EXPECT_EQ(d->verdict, Verdict::unexplained) << directions;
+    EXPECT_NE(d->losses.back().find("do not settle nine constants"), std::string::npos);
     EXPECT_TRUE(d->effects.empty());
   }
   std::string constant;

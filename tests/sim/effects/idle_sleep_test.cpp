@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cstdint>
+#include <ranges>
 
 #include <gtest/gtest.h>
 
@@ -65,6 +67,80 @@ TEST(IdleSleep, HoldsTheLastValueForWholeSecondsWithinARest) {
     EXPECT_TRUE(at_rest) << i;
   }
   EXPECT_EQ(held, 6000U);
+}
+
+// Where it has no room it is refused, and not left out in silence. The table of draw_runs().
+TEST(IdleSleep, WithoutRoomIsRefused) {
+  struct Case {
+    std::uint64_t rests, samples;  // of each rest
+    double fraction;
+    bool fits;
+  };
+  // Of a rest of n seconds the first sample is the one that is held: n - 1 whole seconds are left.
+  for (const Case& c :
+       {Case{100, 100, 0.05, false}, Case{100, 200, 0.05, true}, Case{100, 200, 0.6, false},
+        Case{1, 20'000, 0.05, true}, Case{1, 20'000, 0.001, true}, Case{1, 20'000, 1, false},
+        Case{3, 90, 0, true}}) {
+    SCOPED_TRACE(testing::Message() << c.rests << " of " << c.samples << ", " << c.fraction);
+    const auto effect = made_effect("idle_sleep", {{"fraction", {c.fraction}}});
+    RecordingPlan plan;
+    plan.rate_hz = 100;
+    plan.samples = c.rests * c.samples;
+    for (std::uint64_t i = 0; i < c.rests; ++i) {
+      plan.rests.push_back({i * c.samples, c.samples});
+    }
+    effect->on_recording(plan);
+    if (!c.fits) {
+      EXPECT_FAILS(effect->problem(), ErrorCode::configuration);
+      EXPECT_NE(effect->problem().error().what.find("idle_sleep"), std::string::npos);
+      EXPECT_FALSE(effect->problem().error().hint.empty());
+      continue;
+    }
+    ASSERT_OK(effect->problem());
+    SimulatedBlock block = made_block(plan.samples);
+    const std::vector<gt3x::Counts> read = block.stored;
+    effect->on_firmware(block);
+    const auto held = static_cast<double>(
+        std::ranges::count_if(std::views::iota(std::size_t{0}, block.size()),
+                              [&](std::size_t i) { return block.stored[i] != read[i]; }));
+    const double asked = c.fraction * static_cast<double>(plan.samples);
+    EXPECT_NEAR(held, asked == 0 ? 0 : std::max(100.0, asked), 50);
+  }
+}
+
+// One rest of half a minute between 1,000 of a second: it is found.
+TEST(IdleSleep, TheOnlyLongRestIsFound) {
+  const auto effect = made_effect("idle_sleep", {{"fraction", {0.005}}});
+  RecordingPlan plan;
+  plan.rate_hz = 30;
+  for (std::uint64_t i = 0; i < 1'001; ++i) {
+    plan.rests.push_back({plan.samples, i == 500 ? 900U : 30U});
+    plan.samples += plan.rests.back().samples;
+  }
+  effect->on_recording(plan);
+  ASSERT_OK(effect->problem());
+  SimulatedBlock block = made_block(plan.samples);
+  const std::vector<gt3x::Counts> read = block.stored;
+  effect->on_firmware(block);
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    EXPECT_TRUE(block.stored[i] == read[i] || (i > 15'000 && i < 15'900)) << i;
+  }
+}
+
+// Oracle: the run is what a scenario makes; a bundle of segments of one second each.
+TEST(IdleSleep, ARunThatCannotHoldItIsRefused) {
+  ProtocolRun run;
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    ProtocolSegment segment;
+    segment.name = "still";
+    segment.first_sample = 100 * i;
+    segment.samples = 100;
+    segment.host_start_s = 10.0 * static_cast<double>(i);
+    run.segments.push_back(segment);
+  }
+  ASSERT_OK(run_protocol(run));
+  run.effects = {spec("idle_sleep", {{"fraction", {0.05}}})};
+  EXPECT_FAILS(run_protocol(run), ErrorCode::configuration);
 }
 
 }  // namespace
