@@ -89,7 +89,8 @@ struct ProtocolRecord {
 
 // What the unit stores: one sample per index, segments[i].first_sample on its segment; zeros where
 // no segment is. bad_data where segments overlap, are out of order, hold no finite numbers or are
-// more than 100 million samples; configuration where an effect does not fit in. The same run gives the same counts on every machine.
+// more than 100 million samples; configuration where an effect has no room. The same run gives the
+// same counts on every machine.
 Result<std::vector<gt3x::Counts>> run_protocol(const ProtocolRun& run);
 // The same, with the times.
 Result<ProtocolRecord> record_protocol(const ProtocolRun& run);

