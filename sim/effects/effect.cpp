@@ -191,8 +191,7 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
   }
   const std::vector<Stretch> stretches = stretches_of(plan, at_rest, per_second);
   const double room_s =
-      stretches.empty() ? 0
-                        : static_cast<double>(stretches.back().before + stretches.back().count);
+      stretches.empty() ? 0 : static_cast<double>(stretches.back().before + stretches.back().count);
   const double longest_s = at_rest ? 20 : std::max(1.0, std::ceil(asked_s / 3));
   double left_s = samples > 0 ? asked_s : 0;
   std::map<std::uint64_t, std::uint64_t> runs;  // begin and end, in seconds
@@ -216,9 +215,10 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
   if (left_s >= 1 && runs.empty()) {
     return fail(ErrorCode::configuration,
                 fmt::format("the recording has no room for the effect '{}'", effect), {},
-                at_rest ? "it holds whole seconds of one rest, behind the rest's first sample: give "
-                          "longer rests"
-                        : "give a longer recording");
+                at_rest
+                    ? "it holds whole seconds of one rest, behind the rest's first sample: give "
+                      "longer rests"
+                    : "give a longer recording");
   }
   std::vector<SampleRun> drawn;
   for (const auto& [begin, end] : runs) {
