@@ -167,7 +167,8 @@ Result<std::unique_ptr<FileLock>> lock_of(const RepairCommandOptions& options, C
   if (options.repair.dry_run) {
     return nullptr;
   }
-  SIXPOINT_ASSIGN(auto lock, repair::lock_for_repair(context.env.files, options.folder));
+  SIXPOINT_ASSIGN(auto lock,
+                  repair::lock_for_repair(context.env.files, options.folder, options.paths));
   if (lock == nullptr) {
     context.log().warn("{}: its file system has no locks; let no other run write here",
                        printable(options.folder));

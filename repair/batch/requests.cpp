@@ -195,7 +195,7 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   ConstantsFinder finder(env, std::move(how));
   std::unique_ptr<FileLock> lock;
   if (!request.repair.dry_run) {
-    SIXPOINT_ASSIGN(lock, lock_for_repair(env.files, request.folder));
+    SIXPOINT_ASSIGN(lock, lock_for_repair(env.files, request.folder, request.paths));
   }
   auto named = named_files(env.files, request.paths, {".gt3x"}).files;
   leave_out_outputs(env.files, named, request.folder);

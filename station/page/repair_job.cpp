@@ -72,7 +72,7 @@ Result<PlannedJob> plan_job(FileSystem& files, const RepairOrder& order) {
     return no_files;
   }
   SIXPOINT_CHECK(repair::check_manifest(files, order.output));
-  SIXPOINT_ASSIGN(job.lock, repair::lock_for_repair(files, order.output));
+  SIXPOINT_ASSIGN(job.lock, repair::lock_for_repair(files, order.output, {order.folder}));
   repair::leave_out_outputs(files, job.files, order.output);
   repair::refuse_same_outputs(job.files, order.output);
   return job.files.empty() ? Result<PlannedJob>(no_files) : std::move(job);

@@ -337,12 +337,17 @@ TEST_F(RepairCommand, OnePathIsOneFileHoweverItIsNamed) {
 TEST_F(RepairCommand, TheFolderOfTheRecordingsIsNoOutputFolder) {
   const Bytes before = read_file(files_, archive_ + "/affected.gt3x").value();
   for (const char* more : {"--resume", "--redo-outdated", "--wide"}) {
-    const auto answer =
-        run({"repair", archive_, "-o", archive_, "--constants", folder_ / "constants.json", more});
-    EXPECT_EQ(answer.exit_code, 73);
-    EXPECT_THAT(answer.out, HasSubstr("this is the recording itself; choose another"));
+    const auto answer = run({"repair", archive_, "-o", archive_ + "/.", "--constants",
+                             folder_ / "constants.json", more});
+    EXPECT_EQ(answer.exit_code, 64);
+    EXPECT_THAT(answer.people, HasSubstr("the folder of the recordings"));
     EXPECT_THAT(answer.out + answer.people, testing::Not(HasSubstr("remove")));
   }
+  EXPECT_FALSE(std::filesystem::exists(archive_ + "/manifest.csv"));
+  const auto one = run({"repair", archive_ + "/affected.gt3x", "-o", archive_, "--constants",
+                        folder_ / "constants.json"});
+  EXPECT_EQ(one.exit_code, 73);
+  EXPECT_THAT(one.out, HasSubstr("this is the recording itself; choose another"));
   EXPECT_EQ(read_file(files_, archive_ + "/affected.gt3x").value(), before);
 }
 
