@@ -177,11 +177,12 @@ TEST_F(RecordedTrial, TheHeaderIsTheRecordings) {
   std::string protocol(text->begin(), text->end());
   protocol.replace(protocol.find("256"), 3, "341");
   put("b/protocol.json", protocol);
-  gt3x::Info info = gt3x::tests::made_info("100");
-  info.set("Acceleration Scale", "341.0");
-  info.set("Firmware", "1.9.2");
+  auto info = gt3x::Info::parse(gt3x::tests::made_info("100"));
+  ASSERT_OK(info);
+  info->set("Acceleration Scale", "341.0");
+  info->set("Firmware", "1.9.2");
   ASSERT_OK(files_.remove("b/recording.gt3x"));
-  ASSERT_OK(gt3x::tests::put_recording(files_, "b/recording.gt3x", log_of(341), info));
+  ASSERT_OK(gt3x::tests::put_recording(files_, "b/recording.gt3x", log_of(341), info->serialise()));
   ASSERT_OK(write_recorded_trial(files_, "b", "trial", {effect("tilt")}, 1));
   auto recording = gt3x::Recording::open(files_, "trial/recording.gt3x");
   ASSERT_OK(recording);

@@ -75,9 +75,9 @@ TEST(Tones, AnEvenDriftIsNoRowOfSlips) {
 // Oracle: the drift that is put in, of tones that are longer than any of a protocol. The search for it
 // begins on a stretch of them.
 TEST(Tones, AnEvenDriftOfALongToneIsFound) {
-  for (const double ppm : {-2'500.0, -61.0, 0.7, 5'000.0}) {
+  for (const double ppm : {-61.0, 5'000.0}) {
     const auto drifting = [&](std::size_t n) { return static_cast<double>(n) * ppm * 1e-6; };
-    const Bundle bundle = one_tone(40, 0.6, drifting, 200'000);
+    const Bundle bundle = one_tone(40, 0.6, drifting, 50'000);
     const ToneFit fit = fit_tones(bundle, clean_samples(bundle), {}).front();
     EXPECT_TRUE(fit.slips.empty()) << ppm;
     EXPECT_NEAR(fit.frequency_ppm, ppm, 5 * fit.frequency_sd_ppm);

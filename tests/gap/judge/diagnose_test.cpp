@@ -252,8 +252,8 @@ TEST(Diagnose, RecordingsThatSayNothingAreInconclusive) {
 
 // Two poses fit any gains and offsets: the answer is that of every recording that says too little.
 TEST(Diagnose, TwoPosesAreInconclusive) {
-  Bundle two = tests::made_production({});
-  two.segments.resize(2);
+  Bundle two = tests::made_production({.rounds = 2});
+  std::erase_if(two.segments, [](const Segment& segment) { return segment.pose > 1; });
   const auto d = diagnose(two);
   ASSERT_OK(d);
   EXPECT_FALSE(d->usable());

@@ -176,6 +176,7 @@ TEST(Diagnosis, AugmentedScenarioHoldsTheUnitAndNothingDerived) {
 // Two lines are two effects of the simulator, and one of the answer.
 TEST(Diagnosis, FurtherLinesAreEffectsOfTheScenario) {
   gap::Diagnosis d;
+  d.serial = "MOS2A45130007";
   d.unit.noise_mg = {3.9, 3.9, 5.5};
   d.effects = {named("floor_vibration")};
   d.effects[0].parameters = {{"vector_mg", {1, 2, 3}, {0.1, 0.1, 0.1}}, {"frequency_hz", {12}, {}}};
