@@ -12,6 +12,8 @@ std::vector<NamedFile> named_files(Context& context, const std::vector<std::stri
   for (const std::string& folder : named.empty_folders) {
     context.log().warn("{}: no {} file below this folder", printable(folder),
                        fmt::join(endings, ", "));
+  }
+  if (named.files.empty()) {
     context.worsen(ErrorCode::no_input);  // a disk that is not mounted is an empty folder
   }
   return std::move(named.files);

@@ -25,7 +25,8 @@ using repair::for_each_job;
 using repair::NamedFile;
 using repair::threads_of;
 
-// In the order of `paths`. A folder without a file of these endings gives a warning.
+// In the order of `paths`. A folder without a file of these endings gives a warning; where there is no
+// file at all, the exit code is that of no_input.
 std::vector<NamedFile> named_files(Context& context, const std::vector<std::string>& paths,
                                    const std::vector<std::string>& endings);
 
