@@ -75,7 +75,7 @@ TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsScale) {
       << R"({"seed": 7, "rate_hz": 50, "protocol": "production", "unit": {"accel_scale_lsb_per_g": 341}})";
   ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o", path("bundle")}).exit_code, 0);
   const auto found = run({"gap", "diagnose", path("bundle"), "--scenario-out", path("again.json")});
-  ASSERT_EQ(found.exit_code, 0) << found.out << found.err;
+  ASSERT_EQ(found.exit_code, 0) << found.out << found.people;
   ASSERT_EQ(run({"simulate", "--scenario", path("again.json"), "-o", path("again")}).exit_code, 0);
   std::ifstream in(path("again/protocol.json"));
   EXPECT_EQ(nlohmann::json::parse(in)["accel_scale_lsb_per_g"], 341);
