@@ -3,7 +3,7 @@
 namespace sixpoint {
 
 bool nests_too_deep(std::string_view json) {
-  constexpr int kDeepest = 100;
+  constexpr int kMostLevels = 100;
   int depth = 0;
   bool in_string = false;
   for (std::size_t i = 0; i < json.size(); ++i) {
@@ -13,7 +13,7 @@ bool nests_too_deep(std::string_view json) {
     } else if (in_string) {
       i += c == '\\' ? 1 : 0;  // the character behind it ends nothing
     } else if (c == '[' || c == '{') {
-      if (++depth > kDeepest) {
+      if (++depth > kMostLevels) {
         return true;
       }
     } else if (c == ']' || c == '}') {
