@@ -51,7 +51,7 @@ namespace sixpoint::station {
 inline constexpr std::chrono::minutes kIdle{10};
 inline constexpr std::chrono::seconds kPinWait{60};
 inline constexpr std::size_t kMostWrongPins = 5;
-inline constexpr std::size_t kMostNamesTried = 256;  // so that made-up ones take no memory
+inline constexpr std::size_t kMostNamesTried = 64;  // so that made-up ones take no memory
 
 enum class OperatorRole { technician, engineer };  // an engineer also signs for the station
 std::string_view to_string(OperatorRole role);

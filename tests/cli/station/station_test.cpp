@@ -379,7 +379,7 @@ TEST_F(StationCommand, AStoreThatDoesNotAnswerIsNotAskedAtEachQuestion) {
                  "--files", path("."), "--store", server.store() + "&connect_timeout=2"});
   const int port = port_of(station.line());
   for (int i = 0; i < 3; ++i) {
-    EXPECT_THAT(get(port, "/api/runs", head()), HasSubstr("timeout"));
+    EXPECT_THAT(get(port, "/api/check-units", head()), HasSubstr("postgresql://reader@127.0.0.1"));
   }
   EXPECT_EQ(station.stop(SIGTERM), 0);
   EXPECT_EQ(server.connections(), 1) << "before the page was served";
