@@ -62,13 +62,13 @@ CONF
 }
 
 # kill_node n1 PID...: its daemon, the named processes of its tasks and all above them up to the keeper of the task,
-# at once, as by a power cut.
+# at once, as by a power cut: keepers first, since one that sees its task die reports that.
 kill_node() {
   local node=$1 task line=()
   shift
   for task in "$@"; do
     while [ "${task:-1}" != 1 ]; do
-      line+=("$task")
+      line=("$task" "${line[@]}")
       grep -q '^slurmstepd' "/proc/$task/comm" && break
       task=$(ps -o ppid= -p "$task" | tr -d ' ')
     done
