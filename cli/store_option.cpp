@@ -171,8 +171,7 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
     context.worsen(ErrorCode::io);
     context.log().warn(
         "nothing is lost: it is kept in {}; when the store can be written again, store it with '{} "
-        "--journal "
-        "{}'",
+        "--journal {}'",
         kept->folder, catch_up_line(location), bash_word(kept->folder));
     return kept;
   }
