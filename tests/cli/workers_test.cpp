@@ -41,7 +41,7 @@ TEST_F(Workers, NamedFilesKeepTheOrderInWhichTheyWereNamed) {
   EXPECT_EQ(found[1].error->code, ErrorCode::no_input);
   EXPECT_NE(people_.str().find("empty: no .gt3x file below this folder"), std::string::npos);
   EXPECT_EQ(context_.exit_code, 0) << "of a folder among others";
-  EXPECT_TRUE(named_files(context_, {"empty", "tree/sub/"}, {".agd"}).empty());
+  EXPECT_TRUE(named_files(context_, {"empty", "tree/sub"}, {".agd"}).empty());
   EXPECT_EQ(context_.exit_code, static_cast<int>(ErrorCode::no_input)) << "nothing to work on";
 }
 
