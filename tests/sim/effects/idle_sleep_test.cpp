@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdint>
-#include <ranges>
 
 #include <gtest/gtest.h>
 
@@ -100,9 +99,10 @@ TEST(IdleSleep, WithoutRoomIsRefused) {
     SimulatedBlock block = made_block(plan.samples);
     const std::vector<gt3x::Counts> read = block.stored;
     effect->on_firmware(block);
-    const auto held = static_cast<double>(
-        std::ranges::count_if(std::views::iota(std::size_t{0}, block.size()),
-                              [&](std::size_t i) { return block.stored[i] != read[i]; }));
+    double held = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      held += block.stored[i] != read[i] ? 1 : 0;
+    }
     const double asked = c.fraction * static_cast<double>(plan.samples);
     if (c.fraction > 0.5) {  // more than has room
       EXPECT_GT(held, 0.4 * static_cast<double>(plan.samples));
