@@ -51,6 +51,11 @@ class SilentServer {
   std::string store() const {
     return "postgresql://reader@127.0.0.1:" + std::to_string(port_) + "/none?sslmode=disable";
   }
+  // Somebody has connected, or does so within ten seconds.
+  bool is_asked() const {
+    pollfd waiting{listener_, POLLIN, 0};
+    return ::poll(&waiting, 1, 10'000) == 1;
+  }
   // That nobody has accepted yet.
   int connections() const {
     pollfd waiting{listener_, POLLIN, 0};
@@ -368,6 +373,7 @@ TEST_F(StationCommand, EndsInTimeWhateverItsThreadsWaitFor) {
   Child station({"station", "--port", "0", "--device", "virtual:seed=7", "--state", path("state"),
                  "--files", path("."), "--store", server.store()});
   ASSERT_THAT(station.line(), StartsWith("http://"));
+  EXPECT_TRUE(server.is_asked());
   EXPECT_EQ(station.stop(SIGTERM), 0);
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("ended while a lane was at work"));
 }
