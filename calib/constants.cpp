@@ -389,8 +389,6 @@ Result<ConstantsRecord> parse_constants_record(std::string_view text) {
     return fail(ErrorCode::bad_data, "is too long for a constants file", "constants.json",
                 "give a file written by 'sixpoint solve -o'");
   }
-  // Without a callback and with exceptions off; nesting is bounded by the size limit and the parser
-  // is not recursive.
   const Json json = parse_json(text);
   if (json.is_discarded()) {
     return fail(ErrorCode::bad_data, "is not JSON", "constants.json",
