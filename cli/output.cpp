@@ -83,6 +83,10 @@ bool belongs_to_record(FileSystem& files, const std::string& path, std::string_v
          repair::is_plan(files, folder) || repair::is_plan(files, folder + "/..");
 }
 
+bool is_recording_name(std::string_view path) {
+  return path.ends_with(".gt3x") || path.ends_with(".agdc") || path.ends_with(".agd");
+}
+
 // Of a regular file that is no input; `named` may be a link to it.
 Target look_at_content(FileSystem& files, const std::string& named) {
   const std::string path = files.real_path(named).value_or(named);
@@ -94,9 +98,8 @@ Target look_at_content(FileSystem& files, const std::string& named) {
   if (is_database(beginning)) {
     return Target::database;
   }
-  const bool named_so =
-      path.ends_with(".gt3x") || path.ends_with(".agdc") || path.ends_with(".agd");
-  if (named_so || beginning.starts_with("PK\x03\x04") || beginning.starts_with("PK\x05\x06")) {
+  if (is_recording_name(path) || beginning.starts_with("PK\x03\x04") ||
+      beginning.starts_with("PK\x05\x06")) {
     return Target::recording;
   }
   return belongs_to_record(files, path, beginning) ? Target::record : Target::plain;
@@ -139,6 +142,9 @@ Status allow_folder(FolderTarget target, bool force, const std::string& path) {
     case FolderTarget::nothing:
     case FolderTarget::empty:
       return {};
+    case FolderTarget::recording_name:
+      return fail(ErrorCode::usage, "the output is a folder, and this is the name of a recording",
+                  path, "name a folder, for example 'repaired'");
     case FolderTarget::record:
       return refused("this is a bundle or the plan of an archive", path, kAnotherName);
     case FolderTarget::filled:
@@ -184,7 +190,10 @@ Target look_at(FileSystem& files, const std::string& path, const std::vector<Fil
 FolderTarget look_at_folder(FileSystem& files, const std::string& path) {
   const auto info = files.info(path);
   if (!info) {
-    return files.link_info(path) ? FolderTarget::no_folder : FolderTarget::nothing;
+    if (files.link_info(path)) {
+      return FolderTarget::no_folder;
+    }
+    return is_recording_name(path) ? FolderTarget::recording_name : FolderTarget::nothing;
   }
   if (!info->is_folder) {
     return FolderTarget::no_folder;

@@ -70,11 +70,19 @@ Result<Placing> placing_of(Target target, bool force, const std::string& path);
 //
 //   what has the name                    without --force    with --force
 //   nothing                              made               made
+//   nothing; *.gt3x, *.agdc or *.agd     64, a folder       64, a folder
 //   an empty folder                      used               used
 //   a bundle or the plan of an archive   73, another name   73, another name
 //   another folder                       73, "--force"      used; its files by the rule above
 //   anything else                        73, another name   73, another name
-enum class FolderTarget : std::uint8_t { nothing, empty, record, filled, no_folder };
+enum class FolderTarget : std::uint8_t {
+  nothing,
+  recording_name,
+  empty,
+  record,
+  filled,
+  no_folder
+};
 Status allow_folder(FolderTarget target, bool force, const std::string& path);
 
 // What has the name `path`; `inputs` are those of the command.

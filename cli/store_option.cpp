@@ -14,7 +14,6 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
-#include "db/journal.h"
 #include "db/records.h"
 #include "gt3x/forms/model.h"
 #include "repair/rescale/applying_constants.h"
@@ -145,10 +144,6 @@ std::vector<std::string> last_resort_folders(const std::string& location) {
   }
   std::erase_if(folders, [](const std::string& folder) { return !is_nobody_elses(folder); });
   return folders;
-}
-
-Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id) {
-  return db::Journal::holds(files, journal_folder(location), id);
 }
 
 Result<db::Saved> keep_records(Context& context, const std::string& location,

@@ -94,8 +94,6 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
                                const std::function<Status(db::RecordWriter&)>& work,
                                LastResort last_resort = LastResort::folders);
-// Whether the record of this id is in the journal, so that no store has it yet.
-Result<bool> is_kept_beside(FileSystem& files, const std::string& location, const std::string& id);
 // "stored as 3cb89c474fa2"; "kept in the journal as ..." where the store took nothing.
 std::string kept_as(const db::Saved& kept, const std::string& id);
 // {"in": "store" | "journal", "folder", "error"}

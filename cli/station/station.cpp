@@ -23,6 +23,7 @@
 #include "cli/station/practice_bench.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
+#include "db/journal.h"
 #include "station/access/operators.h"
 #include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"
@@ -101,8 +102,9 @@ class StationStore {
   }
   Result<std::optional<Error>> may_write(const station::WaitingConstants& waiting) {
     const std::lock_guard lock(mutex_);
-    SIXPOINT_ASSIGN(const bool is_kept_beside,
-                    cli::is_kept_beside(context_.env.files, options_.store, waiting.id));
+    SIXPOINT_ASSIGN(
+        const bool is_kept_beside,
+        db::Journal::holds(context_.env.files, journal_folder(options_.store), waiting.id));
     auto store = asked(open_existing_store);
     return station::may_write(store, waiting.serial, waiting.id, is_kept_beside);
   }

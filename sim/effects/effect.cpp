@@ -221,6 +221,7 @@ Result<std::vector<SampleRun>> draw_runs(const std::string& effect, const Record
                     : "give a longer recording");
   }
   std::vector<SampleRun> drawn;
+  drawn.reserve(runs.size());
   for (const auto& [begin, end] : runs) {
     drawn.push_back({begin * per_second, end * per_second});
   }

@@ -64,12 +64,15 @@ TEST(OutputRule, FollowsTheTableOfFolders) {
   for (const bool force : {false, true}) {
     EXPECT_TRUE(allowed(FolderTarget::nothing, force));
     EXPECT_TRUE(allowed(FolderTarget::empty, force));
+    EXPECT_FALSE(allowed(FolderTarget::recording_name, force));
     EXPECT_FALSE(allowed(FolderTarget::record, force));
     EXPECT_FALSE(allowed(FolderTarget::no_folder, force));
     EXPECT_EQ(allowed(FolderTarget::filled, force), force);
   }
   EXPECT_EQ(allow_folder(FolderTarget::record, true, "here").error().code,
             ErrorCode::cannot_create);
+  EXPECT_EQ(allow_folder(FolderTarget::recording_name, true, "here").error().code,
+            ErrorCode::usage);
 }
 
 class OutputLook : public tests::CommandTest {
@@ -122,6 +125,7 @@ TEST_F(OutputLook, TellsThePartsOfRecordsOfTheProgram) {
   EXPECT_EQ(look_at_folder(files, path("bundle")), FolderTarget::record);
   EXPECT_EQ(look_at_folder(files, path("plan")), FolderTarget::record);
   EXPECT_EQ(look_at_folder(files, path("none")), FolderTarget::nothing);
+  EXPECT_EQ(look_at_folder(files, path("none.gt3x")), FolderTarget::recording_name);
   EXPECT_EQ(look_at_folder(files, path("plan/shards")), FolderTarget::filled);
   EXPECT_EQ(look_at_folder(files, path("s.journal")), FolderTarget::no_folder);
   std::filesystem::create_directory(path("new"));
