@@ -226,19 +226,23 @@ std::vector<std::string> codes_in_reason(const std::string& reason) {
 namespace {
 
 std::vector<KnownBad> known_bad_of(const std::vector<db::StationEvent>& events,
-                                   const std::string& station) {
-  std::map<std::string, std::vector<std::string>> units;
+                                   const StationState& state) {
+  std::map<std::string, KnownBad> units;
   for (const db::StationEvent& event : events) {
-    if (event.action == "check_unit_end") {
-      units.erase(event.serial);
-    } else if (event.action == "check_unit" && event.station == station) {
-      units[event.serial] = codes_in_reason(event.reason);
+    const bool is_named = event.action == "check_unit" && event.station == state.station;
+    const auto codes = is_named ? codes_in_reason(event.reason) : std::vector<std::string>{};
+    if (!codes.empty()) {
+      units[event.serial] = {event.serial, codes, std::nullopt};
+    } else if (const auto unit = units.find(event.serial);
+               unit != units.end() && !unit->second.until &&
+               (is_named || event.action == "check_unit_end")) {
+      unit->second.until = event.made_at;
     }
   }
   std::vector<KnownBad> known;
-  for (const auto& [serial, codes] : units) {
-    if (!codes.empty()) {
-      known.push_back({serial, codes});
+  for (const auto& [serial, unit] : units) {
+    if (!unit.until || !state.signature || *unit.until > state.signature->made_at) {
+      known.push_back(unit);
     }
   }
   return known;
@@ -247,14 +251,14 @@ std::vector<KnownBad> known_bad_of(const std::vector<db::StationEvent>& events,
 // Why this known-bad unit locks the station; nothing where it failed as it must.
 std::optional<std::string> why_not_as_bad_as_known(const KnownBad& unit,
                                                    const std::optional<RunSummary>& last,
-                                                   const StationState& state,
                                                    const std::optional<UtcTime>& now) {
   const std::string must = fmt::format("{}", fmt::join(unit.codes, ", "));
-  if (now && (!last || last->started < *now - kShift)) {
-    return fmt::format("known-bad unit {} was not measured in this shift; it must fail with {}",
-                       unit.serial, must);
+  const char* removed = unit.until ? "; it was removed since: an engineer signs" : "";
+  if (now && (!last || last->started < unit.until.value_or(*now) - kShift)) {
+    return fmt::format("known-bad unit {} was not measured in this shift; it must fail with {}{}",
+                       unit.serial, must, removed);
   }
-  if (!last || (state.signature && last->started <= state.signature->made_at)) {
+  if (!last) {
     return std::nullopt;
   }
   std::vector<std::string> codes = last->codes;
@@ -264,8 +268,8 @@ std::optional<std::string> why_not_as_bad_as_known(const KnownBad& unit,
   if (failed && codes == unit.codes) {
     return std::nullopt;
   }
-  return fmt::format("known-bad unit {} must fail with {}, and its last run says {} {}",
-                     unit.serial, must, to_string(last->verdict), fmt::join(codes, ", "));
+  return fmt::format("known-bad unit {} must fail with {}, and its last run says {} {}{}",
+                     unit.serial, must, to_string(last->verdict), fmt::join(codes, ", "), removed);
 }
 
 }  // namespace
@@ -302,18 +306,18 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
       state.charts.push_back(std::move(chart));
     }
   }
-  state.known_bad = known_bad_of(events, station);
+  state.known_bad = known_bad_of(events, state);
   for (const KnownBad& unit : state.known_bad) {
     db::RunFilter of_unit;
     of_unit.serial = unit.serial;
     std::optional<RunSummary> last;
     SIXPOINT_CHECK(store.for_each_run(of_unit, [&](const db::RunRecord& run) -> Status {
-      if (run.station == station) {
+      if (run.station == station && (!unit.until || run.started <= *unit.until)) {
         last = summary_of(run);
       }
       return {};
     }));
-    if (auto reason = why_not_as_bad_as_known(unit, last, state, now)) {
+    if (auto reason = why_not_as_bad_as_known(unit, last, now)) {
       state.locked = true;
       state.reasons.push_back(*std::move(reason));
     }
@@ -338,6 +342,9 @@ Json StationState::to_json() const {
                {"reasons", reasons},          {"check_units", check_units},
                {"known_bad", Json::object()}, {"signature", nullptr}};
   for (const KnownBad& unit : known_bad) {
+    if (unit.until) {
+      continue;
+    }
     json["known_bad"][unit.serial] = unit.codes;
   }
   if (signature) {

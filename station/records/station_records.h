@@ -46,15 +46,19 @@ struct CheckUnitChart {
 // that the station still finds what is wrong. The rule, for each such unit that was named for this
 // station:
 //
-// | its last run here since the signature   | the station                                         |
+// | its last run here                       | the station                                         |
 // |-----------------------------------------|-----------------------------------------------------|
 // | none in the last kShift                 | locked: measure it first (known where `now` is)     |
 // | failed with just its codes              | open                                                |
-// | passed, or other codes, or no verdict   | locked until it fails as it must, or a signature    |
+// | passed, or other codes, or no verdict   | locked until it fails as it must                    |
+//
+// A signature opens none of these. A unit that was removed, or named again without codes, lifts no
+// lock that it set before: that stays until an engineer signs. Afterwards it sets none.
 inline constexpr std::chrono::hours kShift{12};
 struct KnownBad {
   std::string serial;
   std::vector<std::string> codes;  // sorted
+  std::optional<UtcTime> until;    // when it ceased to be one
 };
 // The decision's reason with the codes in front, and back; none where it names no codes. usage for
 // a code that is not in the catalogue (verdict.h).
@@ -64,7 +68,7 @@ std::vector<std::string> codes_in_reason(const std::string& reason);
 struct StationState {
   std::string station;
   std::vector<std::string> check_units;  // of all stations: a check unit may be moved
-  std::vector<KnownBad> known_bad;       // of this station
+  std::vector<KnownBad> known_bad;       // of this station, and those that ceased unsigned
   std::vector<CheckUnitChart> charts;    // six for each check unit that was measured here
   bool locked = false;
   std::vector<std::string> reasons;           // why, for people

@@ -61,15 +61,18 @@ class StationRecords : public testing::Test {
     ASSERT_OK(store_.add_run(run, {}));
   }
   void decide(const std::string& action, const std::string& serial = {},
-              const std::string& station = "A") {
+              const std::string& station = "A", const std::string& reason = "looked at it") {
     env_.clock.set(env_.clock.now() + std::chrono::minutes(10));
     db::StationEvent event;
     event.station = station;
     event.serial = serial;
     event.action = action;
     event.operator_name = "Eve";
-    event.reason = "looked at it";
+    event.reason = reason;
     ASSERT_OK(store_.add_station_event(event));
+  }
+  void name_known_bad(const std::string& serial) {
+    decide("check_unit", serial, "A", *station::reason_with_codes("zero_high", "dropped"));
   }
   // Ten runs of a check unit with a scatter of a milligravity.
   void baseline(const std::string& serial = "CHECK1", const std::string& station = "A") {

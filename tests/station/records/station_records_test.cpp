@@ -77,14 +77,7 @@ TEST_F(StationRecords, AKnownBadUnitMustFailAsItIsKnownTo) {
   const auto locked = [&](const std::string& station = "A") {
     return station_state(store_, station, default_limits().check_unit, env_.clock.now())->locked;
   };
-  db::StationEvent event;
-  event.station = "A";
-  event.serial = "BAD1";
-  event.action = "check_unit";
-  event.operator_name = "Eve";
-  event.reason = *reason_with_codes("zero_high", "dropped");
-  env_.clock.set(env_.clock.now() + std::chrono::minutes(10));
-  ASSERT_OK(store_.add_station_event(event));
+  name_known_bad("BAD1");
   EXPECT_TRUE(locked()) << "not measured in this shift";
   EXPECT_FALSE(locked("B")) << "it was named for A";
   add_run("BAD1", JigVerdict::fail);  // with zero_high
@@ -100,12 +93,38 @@ TEST_F(StationRecords, AKnownBadUnitMustFailAsItIsKnownTo) {
   add_run("BAD1", JigVerdict::pass);
   EXPECT_TRUE(locked());
   decide("sign");
-  EXPECT_FALSE(locked()) << "an engineer has looked";
+  EXPECT_TRUE(locked()) << "a signature does not open this lock";
+  add_run("BAD1", JigVerdict::fail);
+  EXPECT_FALSE(locked());
   EXPECT_FAILS(reason_with_codes("zero_hihg", "x"), ErrorCode::usage);
   EXPECT_FAILS(reason_with_codes("", "x"), ErrorCode::usage);
   EXPECT_TRUE(codes_in_reason("expects nothing: really").empty());
   const std::vector<std::string> two = {"noise_high", "zero_high"};
   EXPECT_EQ(codes_in_reason(*reason_with_codes("zero_high,noise_high", "x")), two);
+}
+
+// Removed, and named again without codes.
+TEST_F(StationRecords, AKnownBadUnitThatCeasesLiftsNoLock) {
+  const auto state = [&] {
+    return station_state(store_, "A", default_limits().check_unit, env_.clock.now()).value();
+  };
+  for (const char* ceases : {"check_unit_end", "check_unit"}) {
+    name_known_bad("BAD1");
+    add_run("BAD1", JigVerdict::fail);  // with zero_high
+    decide(ceases, "BAD1");
+    env_.clock.set(env_.clock.now() + kShift + std::chrono::hours(1));
+    EXPECT_FALSE(state().locked) << "it had set none, and sets none any more";
+    name_known_bad("BAD1");
+    add_run("BAD1", JigVerdict::pass);
+    decide(ceases, "BAD1");
+    ASSERT_TRUE(state().locked) << ceases;
+    EXPECT_THAT(state().reasons[0], HasSubstr("it was removed since: an engineer signs"));
+    EXPECT_TRUE(state().to_json()["known_bad"].empty());
+    add_run("BAD1", JigVerdict::fail);
+    EXPECT_TRUE(state().locked) << "what it does afterwards counts no more";
+    decide("sign");
+    EXPECT_FALSE(state().locked) << ceases;
+  }
 }
 
 TEST_F(StationRecords, ANewBaselineForgetsTheOldOne) {
