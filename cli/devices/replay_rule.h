@@ -8,7 +8,7 @@
 // | jig: the run's kind in the store           | jig                        | replay            |
 // | jig: constants and writes in the store     | yes                        | no                |
 // | jig: counts for retests, locks, trends     | yes                        | no                |
-// | jig: --certificate, --label                | yes                        | refused           |
+// | jig: --certificate, --label, --study       | yes                        | refused           |
 // | capture: constants in the store            | yes                        | no                |
 // | capture: --constants-out                   | yes                        | refused           |
 // | station                                    | yes                        | refused           |

@@ -134,6 +134,9 @@ Status check_outputs(const JigCommandOptions& options, Outputs& outputs) {
   if (!options.label.empty()) {
     SIXPOINT_CHECK(refuse_of_replay(options.device, "--label"));
   }
+  if (!options.study.empty()) {
+    SIXPOINT_CHECK(refuse_of_replay(options.device, "--study"));
+  }
   if (!options.label.empty() && !options.write) {
     return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
                 "add --write, which writes the constants and reads them back");
@@ -251,6 +254,9 @@ Result<station::JigSessionOptions> session_options(Context& context,
   session.keep_interrupted = true;
   SIXPOINT_ASSIGN(const station::JigDue jig_due, due_of(options));
   SIXPOINT_CHECK(station::check_jig_due(jig_due, context.env.clock.now()));
+  if (!jig_due.exception.empty()) {
+    SIXPOINT_CHECK(sign_off(context, jig_due.signed_by));
+  }
   if (std::string note = station::jig_due_note(jig_due, context.env.clock.now()); !note.empty()) {
     context.log().warn("{}", note);
     session.notes.push_back(std::move(note));
@@ -263,7 +269,7 @@ Result<station::JigSessionOptions> session_options(Context& context,
 Result<station::RetestState> retest_state(Context& context, const JigCommandOptions& options,
                                           const std::string& serial, station::StationGuard& guard,
                                           Result<db::Store>& store) {
-  if (!options.study.empty() || is_replay(options.device)) {
+  if (is_replay(options.device)) {
     return station::RetestState{};
   }
   if (!store) {
@@ -271,7 +277,8 @@ Result<station::RetestState> retest_state(Context& context, const JigCommandOpti
         "the store does not answer: whether the station is locked and how often the unit failed "
         "is taken from this station's memory");
   }
-  return guard.may_start(store, serial, options.station);
+  return guard.may_start(store, serial, options.station,
+                         options.study.empty() ? station::StartOf::run : station::StartOf::study);
 }
 
 void show(Context& context, const station::JigAction& action) {

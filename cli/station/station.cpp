@@ -407,6 +407,9 @@ Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(
       const station::JigDue jig_due,
       station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by));
+  if (!jig_due.exception.empty()) {
+    SIXPOINT_CHECK(sign_off(context, jig_due.signed_by));
+  }
   SIXPOINT_ASSIGN(const auto lock, lock_of_station(state_folder(options), context));
   SIXPOINT_ASSIGN(auto token, station::read_or_make_token(context.env.files,
                                                           options.token_file.empty()

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "base/measure.h"
@@ -104,7 +105,8 @@ void result(Xml& xml, const std::string& name, Inside inside) {
   });
 }
 
-const char* conformity_of(JigVerdict verdict) {
+// Without an element where nothing is said for or against the unit.
+std::string conformity_of(JigVerdict verdict) {
   switch (verdict) {
     case JigVerdict::pass:
       return "pass";
@@ -112,8 +114,25 @@ const char* conformity_of(JigVerdict verdict) {
       return "conditionalPass";
     case JigVerdict::conditional_fail:
       return "conditionalFail";
-    default:
+    case JigVerdict::fail:
       return "fail";
+    default:
+      return {};
+  }
+}
+
+void conformity(Xml& xml, JigVerdict verdict, const std::string& declaration) {
+  const std::string status = conformity_of(verdict);
+  std::string words = declaration;
+  if (status.empty()) {
+    words += fmt::format("{}No statement of conformity: {}.", words.empty() ? "" : " ",
+                         to_string(verdict));
+  }
+  if (!words.empty()) {
+    xml.words("dcc:declaration", words);
+  }
+  if (!status.empty()) {
+    xml.value("dcc:conformity", status);
   }
 }
 
@@ -178,14 +197,13 @@ void statements(Xml& xml, const Certificate& c) {
       [&] {
         xml.value("dcc:norm", "ILAC-G8:09/2019");
         xml.value("dcc:reference", "4.2.3");
-        xml.words("dcc:declaration",
-                  fmt::format("Decision rule: a quantity passes where it lies within its limits by "
-                              "the guard band, which is {:.3g} times the expanded uncertainty "
-                              "(k = {:.3g}) or the least guard band of the quantity. Limits: {}, "
-                              "SHA-256 {}.",
-                              c.decision.guard_factor, c.decision.coverage_factor, c.limits_source,
-                              c.limits_sha256));
-        xml.value("dcc:conformity", conformity_of(c.verdict));
+        conformity(xml, c.verdict,
+                   fmt::format("Decision rule: a quantity passes where it lies within its limits "
+                               "by the guard band, which is {:.3g} times the expanded uncertainty "
+                               "(k = {:.3g}) or the least guard band of the quantity. Limits: {}, "
+                               "SHA-256 {}.",
+                               c.decision.guard_factor, c.decision.coverage_factor, c.limits_source,
+                               c.limits_sha256));
       },
       "basic_conformity");
   xml.element("dcc:statement", [&] {
@@ -194,6 +212,15 @@ void statements(Xml& xml, const Certificate& c) {
         std::string("This is not an accredited calibration. The constants were ") +
             (c.written ? "written into the unit and read back." : "not written into the unit."));
   });
+  std::vector<std::string> remarks = c.reasons;
+  if (c.jig_due) {
+    remarks.push_back("the jig's calibration is due on " + to_iso8601(*c.jig_due).substr(0, 10));
+  }
+  if (!remarks.empty()) {
+    xml.element("dcc:statement", [&] {
+      xml.words("dcc:declaration", fmt::format("Remarks: {}.", fmt::join(remarks, "; ")));
+    });
+  }
 }
 
 void judged(Xml& xml, const JudgedQuantity& quantity, const Certificate& c) {
@@ -214,7 +241,7 @@ void judged(Xml& xml, const JudgedQuantity& quantity, const Certificate& c) {
             xml.element(
                 "dcc:metaData",
                 [&] {
-                  xml.value("dcc:conformity", conformity_of(quantity.verdict));
+                  conformity(xml, quantity.verdict, {});
                   if (quantity.low || quantity.high) {
                     xml.element("dcc:data", [&] {
                       const auto limit = [&](const std::optional<double>& at, const char* kind) {

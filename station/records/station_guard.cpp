@@ -1,6 +1,7 @@
 #include "station/records/station_guard.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -20,6 +21,9 @@ constexpr const char* kName = "/memory.json";
 constexpr std::uint64_t kMostMemory_bytes = 16U << 20U;
 constexpr std::size_t kMostNames = 64;
 constexpr std::size_t kMostWaiting = 64;  // runs of one unit
+// Ten seconds: the store is asked while it is held.
+constexpr int kLockAttempts = 500;
+constexpr std::chrono::milliseconds kLockPause{20};
 
 bool contains(const std::vector<std::string>& list, const std::string& text) {
   return std::ranges::find(list, text) != list.end();
@@ -127,20 +131,39 @@ Status StationGuard::remember(StationMemory memory) const {
                     to_json(memory).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
+Result<std::unique_ptr<FileLock>> StationGuard::hold() const {
+  if (!make_synced_folders(env_.files, folder_)) {
+    return nullptr;  // remember() says so, where there is something to remember
+  }
+  for (int attempt = 0; attempt < kLockAttempts; ++attempt) {
+    auto lock = env_.files.lock(folder_ + "/memory.lock");
+    if (!lock) {
+      return nullptr;
+    }
+    if (*lock != nullptr) {
+      return lock;
+    }
+    env_.clock.sleep(kLockPause);
+  }
+  return fail(ErrorCode::io, "another program holds this station's memory", folder_,
+              "end it, then run this again");
+}
+
 Result<RetestState> StationGuard::may_start(Result<db::Store>& store, const std::string& serial,
-                                            const std::string& name) {
+                                            const std::string& name, StartOf what) {
   if (store) {
-    auto allowed = ask_store(*store, serial, name);
+    auto allowed = ask_store(*store, serial, name, what);
     // A store that fails in mid-question is away.
     if (allowed || allowed.error().code == ErrorCode::configuration) {
       return allowed;
     }
   }
-  return ask_memory(serial);
+  return ask_memory(serial, what);
 }
 
 Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string& serial,
-                                            const std::string& name) {
+                                            const std::string& name, StartOf what) {
+  SIXPOINT_ASSIGN(const auto lock, hold());
   SIXPOINT_ASSIGN(StationMemory known, memory());
   if (!contains(known.names, name) && known.names.size() < kMostNames) {
     known.names.push_back(name);
@@ -162,6 +185,9 @@ Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string&
   SIXPOINT_CHECK(remember(known));
   if (known.locked && !contains(known.check_units, serial)) {
     return fail(station_is_locked(known.why, known.locked_as));
+  }
+  if (what == StartOf::study) {
+    return RetestState{};
   }
   const auto waiting = known.waiting.find(serial);
   return station::may_start(
@@ -202,7 +228,7 @@ Result<RetestState> StationGuard::unit_state(db::Store& store, const std::string
   return refresh(known, store, serial);
 }
 
-Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
+Result<RetestState> StationGuard::ask_memory(const std::string& serial, StartOf what) const {
   SIXPOINT_ASSIGN(const StationMemory known, memory());
   if (contains(known.check_units, serial)) {
     return RetestState{};
@@ -213,7 +239,7 @@ Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
                           known.locked_as));
   }
   const auto unit = known.units.find(serial);
-  if (unit == known.units.end()) {
+  if (unit == known.units.end() || what == StartOf::study) {
     return RetestState{};
   }
   if (!unit->second.may_start) {
@@ -229,6 +255,7 @@ Status StationGuard::note_run(const db::RunRecord& run, bool is_stored) {
   if (run.kind != "jig" || !verdict || (!failed && !is_passed(*verdict))) {
     return {};
   }
+  SIXPOINT_ASSIGN(const auto lock, hold());
   SIXPOINT_ASSIGN(StationMemory known, memory());
   const auto found = known.units.find(run.serial);
   if (!is_stored && (failed || found != known.units.end())) {

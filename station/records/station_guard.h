@@ -12,6 +12,9 @@
 //
 // | store   | the station, under any of its names | unit                    | answer              |
 // |---------|-------------------------------------|-------------------------|---------------------|
+// | any     | any                                 | any, for a gage study   | as below; what its  |
+// |         |                                     |                         | runs demand is left |
+// |         |                                     |                         | out                 |
 // | answers | open or locked                      | any                     | as may_start() of   |
 // |         |                                     |                         | station_records.h,  |
 // |         |                                     |                         | with the runs that  |
@@ -25,10 +28,13 @@
 //
 // A station that is called without a name, or by another spelling, is locked where it is locked
 // under one of the names that it went by. Errors: configuration, and those of the disk. One thread
-// at a time.
+// at a time; several programs of one station wait for each other (memory.lock), where the disk has
+// locks.
 #pragma once
 
+#include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,15 +58,18 @@ struct StationMemory {
   std::map<std::string, std::vector<EndedRun>> waiting;  // runs that the store does not have yet
 };
 
+// A gage study measures a unit that failed often, too.
+enum class StartOf : std::uint8_t { run, study };
+
 class StationGuard {
  public:
-  // `folder` is made when there is something to remember.
+  // `folder` is made when it is asked.
   StationGuard(Env& env, std::string folder, Limits limits)
       : env_(env), folder_(std::move(folder)), limits_(std::move(limits)) {}
 
   // `store`: the store, or why it does not answer.
   Result<RetestState> may_start(Result<db::Store>& store, const std::string& serial,
-                                const std::string& name);
+                                const std::string& name, StartOf what = StartOf::run);
   // What the unit's runs demand of the next one, those too that the store does not have yet.
   Result<RetestState> unit_state(db::Store& store, const std::string& serial) const;
   // After a run. Only those of kind "jig" count, as in the store. `run.id` is empty where nothing
@@ -71,8 +80,10 @@ class StationGuard {
 
  private:
   Result<RetestState> ask_store(db::Store& store, const std::string& serial,
-                                const std::string& name);
-  Result<RetestState> ask_memory(const std::string& serial) const;
+                                const std::string& name, StartOf what);
+  Result<RetestState> ask_memory(const std::string& serial, StartOf what) const;
+  // Held while the memory is read, changed and written. Null where the disk has no locks.
+  Result<std::unique_ptr<FileLock>> hold() const;
   // Brings what `memory` holds about the unit up to what the store has now.
   Result<RetestState> refresh(StationMemory& memory, db::Store& store,
                               const std::string& serial) const;

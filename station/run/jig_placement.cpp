@@ -343,7 +343,8 @@ bool JigRun::agrees_with_first_round(const PoseReading& reading) {
   if (!repeats_refused(reading)) {
     last_refused_ = reading;
     refuse(reading.pose,
-           fmt::format("tilted {:.1f} degrees from how it lay in the first round", apart_deg));
+           fmt::format("tilted {:.1f} degrees from how it lay in the first round", apart_deg),
+           JigAction::Refusal::tilted);
     return false;
   }
   last_refused_.reset();
@@ -388,7 +389,7 @@ void JigRun::on_settled() {
     return;
   }
   if (const std::string reason = why_not_wanted(face.pose); !reason.empty()) {
-    refuse(face.pose, reason);
+    refuse(face.pose, reason, JigAction::Refusal::unwanted);
     return;
   }
   dwell_.clear();
@@ -455,7 +456,8 @@ bool JigRun::tilt_is_accepted(PoseReading& reading) {
   if (!repeated) {
     last_refused_ = reading;
   }
-  refuse(reading.pose, fmt::format("tilted {:.1f} degrees", reading.tilt_deg));
+  refuse(reading.pose, fmt::format("tilted {:.1f} degrees", reading.tilt_deg),
+         JigAction::Refusal::tilted);
   return false;
 }
 

@@ -312,11 +312,11 @@ void JigRun::accept(const PoseReading& reading) {
   ask_next_or_end_phase();
 }
 
-void JigRun::refuse(Pose pose, std::string reason) {
+void JigRun::refuse(Pose pose, std::string reason, JigAction::Refusal refusal) {
   leave();
   ++progress_.refusals;
   ++refusals_in_row_;
-  actions_.push_back({JigAction::Kind::refused, pose, std::move(reason)});
+  actions_.push_back({JigAction::Kind::refused, pose, std::move(reason), refusal});
   if (refusals_in_row_ >= options_.refusals_in_row ||
       progress_.refusals >= kMostRefusals * options_.refusals_in_row) {
     finish(JigOutcome::too_many_refusals,

@@ -186,9 +186,15 @@ struct JigAction {
     write,     // write the constants, then call on_written()
     finished,
   };
+  enum class Refusal {
+    other,     // it moved, lies between two faces, is too noisy
+    unwanted,  // it lies on the face `pose`, which is not wanted
+    tilted,    // it lies on the face `pose`, tilted
+  };
   Kind kind = Kind::place;
   Pose pose = Pose::plus_z;
   std::string text;  // for people, one sentence without a full stop
+  Refusal refusal = Refusal::other;
 };
 
 // The pose that a calibrated reading shows, and how far it is from it.
@@ -282,7 +288,8 @@ class JigRun {
   void write_or_finish();
   std::optional<int> turned_deg() const;  // as the phase asks for
   void accept(const PoseReading& reading);
-  void refuse(Pose pose, std::string reason);
+  void refuse(Pose pose, std::string reason,
+              JigAction::Refusal refusal = JigAction::Refusal::other);
   void leave();
   void finish(JigOutcome outcome, std::string text);
 

@@ -85,6 +85,13 @@ class Session {
   // While the unit is away: what the operator said, and what the jig said.
   std::vector<OperatorCommand> said_while_away_;
   std::optional<Error> jig_while_away_;
+  bool jig_failed_ = false;
+  // What the jig answered, which is passed on.
+  template <class Answer>
+  Answer of_jig(Answer answer) {
+    jig_failed_ = jig_failed_ || !answer;
+    return answer;
+  }
 };
 
 Status Session::prepare(const std::optional<JigResume>& resume) {
@@ -198,8 +205,9 @@ Status Session::come_back(JigRun& run, const Error& error) {
     SIXPOINT_CHECK(obey(run, command));
   }
   // After a power cut the jig does not know where the unit lies.
-  return run.open_poses().empty() ? Status{}
-                                  : JigWatch::place(*jig_, run.open_poses().front(), run.phase());
+  return run.open_poses().empty()
+             ? Status{}
+             : of_jig(JigWatch::place(*jig_, run.open_poses().front(), run.phase()));
 }
 
 // The unit did not come back, or the wait was ended.
@@ -240,7 +248,7 @@ Status Session::look_while_away() {
     }
   }
   if (jig_->turns_by_itself()) {
-    if (const Status free = device::check_jig(*jig_); !free) {
+    if (const Status free = of_jig(device::check_jig(*jig_)); !free) {
       jig_while_away_ = free.error();
       static_cast<void>(jig_->stop());
       return fail(free.error());
@@ -258,7 +266,7 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.stream = stream_.statistics(unit_);
   report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
-  report_.codes = {interruption(error.code)};
+  report_.codes = {jig_failed_ ? "interrupted" : interruption(error.code)};
   report_.reasons.push_back(error.what);
   report_.ended_by = error;
 }
@@ -314,7 +322,7 @@ Status Session::stream(JigRun& run) {
     }
     if (run.phase() !=
         JigPhase::finished) {  // else the operator's stop would be a fault of the jig
-      SIXPOINT_ASSIGN(const std::optional<Pose> stands, watch_.ask(*jig_, now_s));
+      SIXPOINT_ASSIGN(const std::optional<Pose> stands, of_jig(watch_.ask(*jig_, now_s)));
       run.set_jig_pose(stands);
     }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
@@ -360,7 +368,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
       case JigAction::Kind::accepted:
       case JigAction::Kind::refused:
         if (jig_ != nullptr) {
-          SIXPOINT_CHECK(watch_.compare(*jig_, action));
+          SIXPOINT_CHECK(of_jig(watch_.compare(*jig_, action)));
         }
         break;
       case JigAction::Kind::dropped:
@@ -374,7 +382,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     report_.stream = stream_.statistics(unit_);
     hooks_.progress(report_, run);
   }
-  return wanted ? JigWatch::place(*jig_, *wanted, run.phase()) : Status{};
+  return wanted ? of_jig(JigWatch::place(*jig_, *wanted, run.phase())) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {

@@ -34,8 +34,9 @@ Status JigWatch::compare(device::Jig& jig, const JigAction& action) {
     return {};
   }
   SIXPOINT_CHECK(device::check_jig(jig));  // a stop or a fault spoils this placement
-  const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
-  if (action.kind != JigAction::Kind::accepted && !tilted) {
+  const bool accepted = action.kind == JigAction::Kind::accepted;
+  const bool tilted = action.refusal == JigAction::Refusal::tilted;
+  if (!accepted && action.refusal == JigAction::Refusal::other) {
     return {};
   }
   SIXPOINT_ASSIGN(const device::JigPosition position, jig.position());
@@ -50,7 +51,10 @@ Status JigWatch::compare(device::Jig& jig, const JigAction& action) {
     return disagree(fmt::format("the jig says it stands at {} and the unit reads {}",
                                 device::to_string(*position.pose), device::to_string(action.pose)));
   }
-  disagreements_ = tilted ? disagreements_ + 1 : 0;
+  if (accepted) {
+    disagreements_ = 0;
+  }
+  disagreements_ += tilted ? 1 : 0;
   if (disagreements_ >= options_.most_disagreements) {
     return disagree(fmt::format(
         "the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "

@@ -40,10 +40,13 @@ class JigWatch {
   // |---------------------------------------|------------------------|--------------------------|
   // | stopped, or a fault                   | any                    | that error               |
   // | it does not know                      | any                    | success                  |
-  // | another pose                          | accepted or tilted     | bad_data                 |
-  // | this pose                             | accepted               | success                  |
+  // | another pose                          | accepted, tilted, or   | bad_data                 |
+  // |                                       | its face is not wanted |                          |
+  // | this pose                             | accepted, or not wanted| success                  |
   // | this pose                             | tilted, the first ones | success                  |
   // | this pose                             | tilted again and again | bad_data                 |
+  // | any                                   | moved, between faces,  | success: they say nothing|
+  // |                                       | too noisy              | about the pose           |
   Status compare(device::Jig& jig, const JigAction& action);
 
  private:

@@ -58,6 +58,7 @@ TEST_F(SessionCommand, AReplayMeasuresNothing) {
   EXPECT_EQ(history["writes"].size(), 1U);
   EXPECT_EQ(jig("replay:" + file, {"--certificate", path("c.pdf")}).exit_code, 64);
   EXPECT_EQ(jig("replay:" + file, {"--write", "--label", path("l.zpl")}).exit_code, 64);
+  EXPECT_EQ(jig("replay:" + file, {"--study", "spring", "--operator", "Ada"}).exit_code, 64);
   EXPECT_EQ(run({"station", "--device", "replay:" + file}).exit_code, 64);
   EXPECT_EQ(
       run({"capture", "--device", "replay:" + file, "--constants-out", path("c.json")}).exit_code,

@@ -110,6 +110,19 @@ TEST_F(CommandTest, JigAsksForThePinWhereThereAreOperators) {
   std::ofstream(path("wrong")) << "1234\n";
   EXPECT_EQ(measured("Ada", "471100\n", {"--pin-file", path("wrong")}), std::pair(77, false));
   EXPECT_EQ(measured("Ada", "", {"--pin-file", path("none")}), std::pair(66, false));
+  // An exception for an overdue jig is an engineer's, by the engineer's PIN.
+  const auto excepted = [&](const std::string& by, const std::string& typed) {
+    return measured("Ada", typed,
+                    {"--pin-file", path("pin"), "--jig-due", "2001-01-01", "--jig-exception",
+                     "no other jig", "--jig-exception-by", by});
+  };
+  ASSERT_EQ(
+      tests::run_command(posix_env(), {"operator", "add", "Eve", "--role", "engineer"}, "081500\n")
+          .exit_code,
+      0);
+  EXPECT_EQ(excepted("Eve", "081500\n"), std::pair(0, true));
+  EXPECT_EQ(excepted("Eve", ""), std::pair(77, false));
+  EXPECT_EQ(excepted("Ada", "471100\n"), std::pair(77, false)) << "a technician";
   ::unsetenv("XDG_DATA_HOME");
 }
 

@@ -56,6 +56,7 @@ TEST_F(OtherDevices, AStoppedJigTurnsAfterTheOperatorsWordOnly) {
   EXPECT_EQ(pressed.exit_code, 69);
   EXPECT_THAT(pressed.people, HasSubstr("emergency stop"));
   EXPECT_EQ(pressed.json()["poses"].size(), 2U) << "what was measured is kept";
+  EXPECT_EQ(pressed.json()["codes"], cli::Json::array({"interrupted"})) << "the unit is there";
   const auto held = jig("virtual:stopped=1");
   EXPECT_EQ(held.exit_code, 69);
   EXPECT_THAT(held.people, HasSubstr("--jig-is-free"));
@@ -65,10 +66,13 @@ TEST_F(OtherDevices, AStoppedJigTurnsAfterTheOperatorsWordOnly) {
 }
 
 TEST_F(OtherDevices, AJigThatLiesIsNoticed) {
-  const auto elsewhere = jig("virtual:wrong_pose_at=3");
-  EXPECT_EQ(elsewhere.exit_code, 65);
-  EXPECT_THAT(elsewhere.people, HasSubstr("the jig says it stands at +x and the unit reads -x"));
-  EXPECT_TRUE(elsewhere.json()["stored_id"].is_null());
+  // The first face is the jig's word alone; the second placement tells.
+  for (int turn = 1; turn <= 14; ++turn) {
+    const auto elsewhere = jig("virtual:wrong_pose_at=" + std::to_string(turn));
+    EXPECT_EQ(elsewhere.exit_code, 65) << turn;
+    EXPECT_THAT(elsewhere.people, HasSubstr("the jig says it stands at")) << turn;
+    EXPECT_TRUE(elsewhere.json()["stored_id"].is_null());
+  }
   const auto crooked = jig("virtual:lie_deg=9");
   EXPECT_NE(crooked.exit_code, 0);
   EXPECT_THAT(crooked.people + crooked.out, HasSubstr("tilted"));

@@ -24,6 +24,29 @@ std::string dcc_of(const db::RunRecord& run) {
   return certificate_dcc(*certificate);
 }
 
+// Some quantities are too near to their limits; the jig is overdue, and an engineer signed for it.
+Certificate undecided() {
+  Certificate out = *certificate_of(record_of(7, {}));
+  out.verdict = JigVerdict::inconclusive;
+  out.quantities.at(0).verdict = JigVerdict::inconclusive;
+  out.quantities.at(1).verdict = JigVerdict::fail;
+  out.reasons = {"the jig was overdue; Eve signed: laboratory closed"};
+  out.jig_due = *parse_iso8601("2020-01-01");
+  return out;
+}
+
+TEST(Dcc, SaysNothingAgainstAUnitWhoseRunIsInconclusive) {
+  const std::string xml = certificate_dcc(undecided());
+  const std::regex fails("<dcc:conformity>fail<");
+  EXPECT_EQ(std::distance(std::sregex_iterator(xml.begin(), xml.end(), fails), {}), 1)
+      << "the one quantity that failed";
+  const std::regex none("No statement of conformity: inconclusive\\.");
+  EXPECT_EQ(std::distance(std::sregex_iterator(xml.begin(), xml.end(), none), {}), 2)
+      << "the whole, and the other quantity";
+  EXPECT_THAT(xml, HasSubstr("Eve signed: laboratory closed"));
+  EXPECT_THAT(xml, HasSubstr("calibration is due on 2020-01-01"));
+}
+
 TEST(Dcc, IsValidByTheSchemasOfPtb) {
   SIXPOINT_NEED_SHARED("dcc/dcc.xsd");
   SIXPOINT_SKIP_UNLESS(output_of("command -v xmllint") != "",
@@ -38,9 +61,10 @@ TEST(Dcc, IsValidByTheSchemasOfPtb) {
   bad.current_zero_lsb = PerAxis<double>{225, 20, 20};
   bad.current_sensitivity_lsb_per_g = PerAxis<double>{250, 250, 250};
   int number = 0;
-  for (const db::RunRecord& run : {record_of(7, writing()), hostile, record_of(9, {}, bad)}) {
+  for (const std::string& xml : {dcc_of(record_of(7, writing())), dcc_of(hostile),
+                                 dcc_of(record_of(9, {}, bad)), certificate_dcc(undecided())}) {
     const std::string file = folder / (std::to_string(++number) + ".dcc.xml");
-    std::ofstream(file) << dcc_of(run);
+    std::ofstream(file) << xml;
     EXPECT_THAT(output_of("xmllint --nonet --noout --schema '" + tests::shared_file("dcc/dcc.xsd") +
                           "' '" + file + "' 2>&1"),
                 HasSubstr(" validates"))

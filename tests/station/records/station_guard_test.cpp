@@ -1,6 +1,8 @@
 #include "station/records/station_guard.h"
 
+#include <atomic>
 #include <fstream>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -49,7 +51,7 @@ class StationGuards : public tests::StationRecords {
 TEST_F(StationGuards, WhereNothingIsToBeRememberedNothingIsWritten) {
   EXPECT_OK(ask("MOS2A1"));
   EXPECT_OK(note("MOS2A1", JigVerdict::pass));
-  EXPECT_FALSE(posix_env().files.info(folder_ / "memory"));
+  EXPECT_FALSE(posix_env().files.info(folder_ / "memory/memory.json"));
   EXPECT_OK(ask_without_store("MOS2A1"));
 }
 
@@ -115,6 +117,50 @@ TEST_F(StationGuards, TheLimitOnFailuresHoldsWhileTheStoreIsAway) {
 
 // A full disk: the store answers what it has, and takes nothing. A tester's four runs: the fourth
 // passed.
+// Two programs of one bench that end their runs at a time.
+TEST_F(StationGuards, NoFailureIsForgottenWhereProgramsNoteThemAtOnce) {
+  constexpr int kPrograms = 4;
+  constexpr int kUnits = 6;
+  std::vector<std::thread> programs;
+  std::atomic<int> noted = 0;
+  for (int program = 0; program < kPrograms; ++program) {
+    programs.emplace_back([&, program] {
+      StationGuard guard(posix_env(), folder_ / "memory", default_limits());
+      for (int unit = 0; unit < kUnits; ++unit) {
+        db::RunRecord run;
+        run.serial = fmt::format("MOS2A{}{}", program, unit);
+        run.kind = "jig";
+        run.verdict = to_string(JigVerdict::fail);
+        noted += guard.note_run(run, /*is_stored=*/false) ? 1 : 0;
+      }
+    });
+  }
+  for (std::thread& program : programs) {
+    program.join();
+  }
+  EXPECT_EQ(noted, kPrograms * kUnits);
+  EXPECT_EQ(guard_.memory()->units.size(), static_cast<std::size_t>(kPrograms * kUnits));
+}
+
+TEST_F(StationGuards, AGageStudyAsksForTheLockAlone) {
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_OK(note("MOS2A1", JigVerdict::fail));
+  }
+  Result<db::Store> open = db::Store::open(env_.env, folder_ / "s.db");
+  Result<db::Store> away = fail(ErrorCode::io, "the server does not answer");
+  for (Result<db::Store>* store : {&open, &away}) {
+    EXPECT_FAILS(guard_.may_start(*store, "MOS2A1", "A"), ErrorCode::configuration);
+    const auto study = guard_.may_start(*store, "MOS2A1", "A", StartOf::study);
+    ASSERT_OK(study);
+    EXPECT_EQ(study->passes_needed, RetestState().passes_needed);
+  }
+  lock();
+  for (Result<db::Store>* store : {&open, &away}) {
+    EXPECT_FAILS(guard_.may_start(*store, "MOS2A2", "A", StartOf::study), ErrorCode::configuration);
+    EXPECT_OK(guard_.may_start(*store, "CHECK1", "A", StartOf::study));
+  }
+}
+
 TEST_F(StationGuards, RunsThatAStoreDoesNotTakeCountBesideThoseThatItHas) {
   add_run("MOS2A1", JigVerdict::fail);
   EXPECT_EQ(ask("MOS2A1")->failures_in_row, 1);

@@ -12,12 +12,10 @@ using device::Pose;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-JigAction judged(JigAction::Kind kind, Pose pose, const std::string& text = "") {
-  JigAction action{};
-  action.kind = kind;
-  action.pose = pose;
-  action.text = text;
-  return action;
+using Refusal = JigAction::Refusal;
+
+JigAction judged(JigAction::Kind kind, Pose pose, Refusal refusal = Refusal::other) {
+  return {kind, pose, "tilted by 7 degrees", refusal};
 }
 
 device::JigPosition standing_at(Pose pose) {
@@ -84,12 +82,13 @@ TEST(JigWatch, RowItDoesNotKnow) {
 }
 
 TEST(JigWatch, RowAnotherPose) {
-  for (const auto& [kind, text] : {std::pair{JigAction::Kind::accepted, ""},
-                                   std::pair{JigAction::Kind::refused, "tilted by 7 degrees"}}) {
+  for (const auto& [kind, refusal] : {std::pair{JigAction::Kind::accepted, Refusal::other},
+                                      std::pair{JigAction::Kind::refused, Refusal::tilted},
+                                      std::pair{JigAction::Kind::refused, Refusal::unwanted}}) {
     mocks::InertJig jig;
     jig.next_position = standing_at(Pose::minus_y);
     JigWatch watch({});
-    const Status status = watch.compare(jig, judged(kind, Pose::plus_x, text));
+    const Status status = watch.compare(jig, judged(kind, Pose::plus_x, refusal));
     ASSERT_FALSE(status);
     EXPECT_EQ(status.error().code, ErrorCode::bad_data);
     EXPECT_THAT(status.error().what, HasSubstr("stands at -y and the unit reads +x"));
@@ -101,9 +100,11 @@ TEST(JigWatch, RowsThisPose) {
   jig.next_position = standing_at(Pose::plus_x);
   JigWatch watch({0.25, 3});
   const JigAction good = judged(JigAction::Kind::accepted, Pose::plus_x);
-  const JigAction tilted = judged(JigAction::Kind::refused, Pose::plus_x, "tilted by 7 degrees");
-  const JigAction noisy = judged(JigAction::Kind::refused, Pose::plus_x, "it was moved");
-  for (const JigAction& action : {good, tilted, tilted, noisy, good, tilted, tilted}) {
+  const JigAction tilted = judged(JigAction::Kind::refused, Pose::plus_x, Refusal::tilted);
+  const JigAction unwanted = judged(JigAction::Kind::refused, Pose::plus_x, Refusal::unwanted);
+  const JigAction elsewhere = judged(JigAction::Kind::refused, Pose::minus_z);
+  for (const JigAction& action :
+       {good, tilted, tilted, unwanted, elsewhere, good, tilted, unwanted, tilted}) {
     EXPECT_OK(watch.compare(jig, action)) << "a good placement between them begins the count anew";
   }
   const Status third = watch.compare(jig, tilted);
