@@ -5,6 +5,8 @@
 //   report.yield();   // 0.97: of the units, those whose last run passed
 #pragma once
 
+#include <map>
+
 #include "db/records.h"
 
 namespace sixpoint::db {
@@ -53,6 +55,29 @@ struct JigUnit {
   std::size_t runs = 0;
   UtcTime last_run;
   std::string last_verdict;
+};
+
+// When units were check units. A check unit is measured every day: its runs say nothing of the units
+// that come to the station, and count in no yield. Of a unit, at whichever station it was named (a
+// check unit may be moved):
+//
+// | decisions about the unit, oldest first | runs that do not count                                |
+// |----------------------------------------|-------------------------------------------------------|
+// | none                                   | none                                                  |
+// | check_unit                             | those that started then or later                      |
+// | check_unit, check_unit_end             | those that started between the two                    |
+// | check_unit, check_unit, check_unit_end | those that started between the first and the last one |
+class CheckUnitTimes {
+ public:
+  explicit CheckUnitTimes(const std::vector<StationEvent>& events);  // oldest first
+  bool hold(const std::string& serial, UtcTime started) const;
+
+ private:
+  struct Period {
+    UtcTime from;
+    std::optional<UtcTime> until;
+  };
+  std::map<std::string, std::vector<Period>> of_;
 };
 
 // Of the jig runs that started in a period.

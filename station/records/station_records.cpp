@@ -93,10 +93,10 @@ RunSummary summary_of(const db::RunRecord& run) {
 
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
-  const std::set<std::string> check_units = check_units_of(events);
+  const db::CheckUnitTimes check_unit_times(events);
   std::vector<RunSummary> out;
   SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-    if (!check_units.contains(run.serial)) {
+    if (!check_unit_times.hold(run.serial, run.started)) {
       out.push_back(summary_of(run));
     }
     return {};

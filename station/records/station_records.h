@@ -28,7 +28,8 @@ namespace sixpoint::station {
 
 RunSummary summary_of(const db::RunRecord& run);
 
-// Of the runs that `filter` selects, without those of check units. Oldest first.
+// Of the runs that `filter` selects, without those of check units (db::CheckUnitTimes). Oldest
+// first.
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter);
 
 // Runs that started on or after the day `from` ("2027-03-31") and before the day `to`; empty: no

@@ -203,6 +203,28 @@ TEST_F(StationRecords, CheckUnitsAndStudiesAreNoStatistics) {
   EXPECT_EQ((*runs)[0].quantities.size(), 6U);
 }
 
+// Oracle: counted by hand. What a unit was before and after it checked the station counts.
+TEST_F(StationRecords, ARunOfACheckUnitNeverCountsAndItsOtherRunsAlwaysDo) {
+  add_run("UNIT1", JigVerdict::pass);
+  decide("check_unit", "UNIT1");
+  add_run("UNIT1", JigVerdict::fail);
+  add_run("UNIT1", JigVerdict::fail, 100, "B");
+  decide("check_unit_end", "UNIT1");
+  add_run("MOS2A1", JigVerdict::pass);
+  const auto runs = summaries(store_, {});
+  ASSERT_OK(runs);
+  ASSERT_EQ(runs->size(), 2U);
+  EXPECT_EQ((*runs)[0].serial, "UNIT1");
+  EXPECT_EQ((*runs)[1].serial, "MOS2A1");
+  const auto report = statistics(*runs, "");
+  EXPECT_EQ(report->all.yield.count, 2U);
+  EXPECT_TRUE(report->all.failure_codes.empty());
+  const auto yield = store_.yield(UtcTime::min(), UtcTime::max());
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->runs, 2U);
+  EXPECT_EQ(yield->passed, 2U);
+}
+
 TEST_F(StationRecords, AGageStudyIsReadBackByItsName) {
   Random random(7);
   for (int part = 0; part < 5; ++part) {
