@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -21,6 +22,11 @@ constexpr std::string_view kStillWithdrawn =
 // The verdicts after which the constants are used.
 bool is_passed(std::string_view verdict) {
   return verdict == "pass" || verdict == "conditional_pass";
+}
+
+// Does a run of this verdict say something about the unit?
+bool is_judged(std::string_view verdict) {
+  return verdict != "stopped" && verdict != "inconclusive";
 }
 
 double share(std::size_t part, std::size_t whole) {
@@ -89,8 +95,8 @@ bool CheckUnitTimes::hold(const std::string& serial, UtcTime started) const {
          });
 }
 
-double YieldReport::yield() const { return share(passed, units); }
-double YieldReport::first_pass_yield() const { return share(passed_first_time, units); }
+double YieldReport::yield() const { return share(passed, judged); }
+double YieldReport::first_pass_yield() const { return share(passed_first_time, judged); }
 
 Result<UnitHistory> Store::unit_history(const std::string& serial) {
   // One moment: a run and the constants that it made belong together.
@@ -195,18 +201,24 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
           "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
           parameters));
   YieldReport report;
-  std::map<std::string, bool> last_passed;  // of each unit
+  std::set<std::string> units;
+  std::map<std::string, bool> last_passed;  // of each unit that was judged
   for (const Row& row : rows) {
     if (check_unit_times.hold(text_of(row[0]), from_ns(integer_of(row[3])))) {
       continue;
     }
     ++report.runs;
-    const bool passed = is_passed(text_of(row[1]));
-    const bool is_first = last_passed.insert_or_assign(text_of(row[0]), passed).second;
-    report.passed_first_time += is_first && passed ? 1 : 0;
     report.retests += is_null(row[2]) ? 0 : 1;
+    units.insert(text_of(row[0]));
+    const std::string verdict = text_of(row[1]);
+    if (is_judged(verdict)) {
+      const bool passed = is_passed(verdict);
+      const bool is_first = last_passed.insert_or_assign(text_of(row[0]), passed).second;
+      report.passed_first_time += is_first && passed ? 1 : 0;
+    }
   }
-  report.units = last_passed.size();
+  report.units = units.size();
+  report.judged = last_passed.size();
   for (const auto& [serial, passed] : last_passed) {
     report.passed += passed ? 1 : 0;
   }

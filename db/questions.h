@@ -2,7 +2,7 @@
 // functions are members of Store (store.h); docs/store.md has the SQL statements.
 //
 //   SIXPOINT_ASSIGN(const YieldReport report, store.yield(from, to));
-//   report.yield();   // 0.97: of the units, those whose last run passed
+//   report.yield();   // 0.97: of the units that were judged, those that passed
 #pragma once
 
 #include <map>
@@ -80,14 +80,25 @@ class CheckUnitTimes {
   std::map<std::string, std::vector<Period>> of_;
 };
 
-// Of the jig runs that started in a period.
+// Of the jig runs that started in a period, but for those of check units. A run that was stopped or
+// inconclusive judges nothing: it says neither for nor against its unit. The numbers are those of
+// station/statistics/statistics.h.
+//
+// | a unit's runs, oldest first | judged | passed | passed_first_time |
+// |-----------------------------|--------|--------|-------------------|
+// | judge nothing               | no     | no     | no                |
+// | judged first: passed        |        |        | yes               |
+// | judged first: failed        |        |        | no                |
+// | judged last: passed         | yes    | yes    |                   |
+// | judged last: failed         | yes    | no     |                   |
 struct YieldReport {
   std::size_t runs = 0;
   std::size_t retests = 0;  // runs that name the run which they repeat
   std::size_t units = 0;
-  std::size_t passed = 0;             // units whose last run passed
-  std::size_t passed_first_time = 0;  // units whose first run passed
-  double yield() const;               // NaN where there were no units
+  std::size_t judged = 0;
+  std::size_t passed = 0;
+  std::size_t passed_first_time = 0;
+  double yield() const;  // of the units that were judged; NaN where there were none
   double first_pass_yield() const;
 };
 
