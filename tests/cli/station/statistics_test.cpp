@@ -33,6 +33,25 @@ TEST_F(CommandTest, StatisticsCountsTheRunsOfTheStore) {
   EXPECT_EQ(run({"statistics", "--store", path("none.db")}).exit_code, 66);
 }
 
+// Two units that were judged by different limits of zero alone.
+TEST_F(StationCommands, CpkNeedsOneSetOfLimits) {
+  write("wide.toml", "[zero_offset_mg]\nlow = -2000\nhigh = 2000\n");
+  const std::vector<std::string> wide = {"--limits", folder_ / "wide.toml"};
+  ASSERT_EQ(measure("seed=1").exit_code, 0);
+  ASSERT_EQ(measure("seed=2", wide).exit_code, 0);
+  const auto without = run({"statistics", "--json"});
+  EXPECT_EQ(without.exit_code, 0);
+  EXPECT_EQ(without.json()["limits_differ"],
+            cli::Json::array({"zero_offset_mg x", "zero_offset_mg y", "zero_offset_mg z"}));
+  EXPECT_FALSE(without.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_TRUE(without.json()["capability"].contains("noise_mg x"));
+  EXPECT_THAT(run({"statistics"}).out,
+              testing::HasSubstr("(--limits FILE names some): zero_offset_mg x, zero_offset_mg y"));
+  const auto with = run({"statistics", "--limits", folder_ / "wide.toml", "--json"});
+  EXPECT_TRUE(with.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_TRUE(with.json()["limits_differ"].empty());
+}
+
 // Two parts, two operators, two readings each, 0.01 apart, on parts that are 1 apart.
 TEST_F(CommandTest, GageRrReadsItsTable) {
   std::ofstream csv(path("g.csv"));
