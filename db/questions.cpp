@@ -196,10 +196,9 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   const CheckUnitTimes check_unit_times(events);
   SIXPOINT_ASSIGN(
       const auto rows,
-      database_->query(
-          "SELECT serial, verdict, retest_of, started_ns FROM runs WHERE kind = 'jig' "
-          "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
-          parameters));
+      database_->query("SELECT serial, verdict, retest_of, started_ns FROM runs WHERE kind = 'jig' "
+                       "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
+                       parameters));
   YieldReport report;
   std::set<std::string> units;
   std::map<std::string, bool> last_passed;  // of each unit that was judged
