@@ -41,7 +41,8 @@ Result<Answer> collect(Context& context, const StatisticsCommandOptions& options
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto runs, station::summaries(store, filter));
   Answer answer;
-  SIXPOINT_ASSIGN(answer.report, station::statistics(runs, options.by, options.limits.empty() ? nullptr : &limits));
+  SIXPOINT_ASSIGN(answer.report, station::statistics(runs, options.by,
+                                                     options.limits.empty() ? nullptr : &limits));
   std::set<std::string> stations;
   SIXPOINT_CHECK(store.for_each_run({}, [&](const db::RunRecord& run) -> Status {
     stations.insert(run.station);
@@ -178,7 +179,8 @@ void add_gage_rr(CLI::App& app, Context& context) {
                                   "... or the runs of 'sixpoint jig --study NAME' in the store");
   file->excludes(name);
   command.add_option("--quantity", options.quantity, "of the runs")->capture_default_str();
-  command.add_option("--axis", options.axis, "of the quantity")->capture_default_str();
+  command.add_option("--axis", options.axis, "of the quantity, where it has axes")
+      ->capture_default_str();
   command.add_option("--tolerance", options.tolerance, "width of the specification")
       ->check(greater_than_zero());
   add_store_option(command, options.store);

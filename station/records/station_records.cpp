@@ -482,6 +482,7 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
                 "'sixpoint limits print' shows what is");
   }
   std::vector<GageReading> readings;
+  std::set<std::string> axes;  // that the quantity has in these runs
   bool known = false;
   db::RunFilter filter;
   filter.kind = kStudyKind;
@@ -491,7 +492,14 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
       return {};
     }
     known = true;
-    if (const auto value = value_in(summary_of(run), quantity, axis)) {
+    const RunSummary summary = summary_of(run);
+    for (const JudgedQuantity& each : summary.quantities) {
+      if (each.name == quantity) {
+        axes.insert(each.axis);
+      }
+    }
+    const bool has_no_axes = axes == std::set<std::string>{""};
+    if (const auto value = value_in(summary, quantity, has_no_axes ? "" : axis)) {
       readings.push_back({run.serial, run.operator_name, *value});
     }
     return {};
@@ -501,10 +509,15 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
                 fmt::format("the store has no runs of the study '{}'", printable(study, 60)), {},
                 "measure them with 'sixpoint jig --study NAME --operator WHO'");
   }
+  if (axes.empty()) {
+    return fail(ErrorCode::usage, fmt::format("the runs of the study have no {}", quantity), {},
+                "take another --quantity");
+  }
   if (readings.empty()) {
     return fail(ErrorCode::usage,
                 fmt::format("the runs have no {} of axis '{}'", quantity, printable(axis, 20)), {},
-                "name one of its axes with --axis");
+                fmt::format("name one of its axes with --axis: {}",
+                            printable(fmt::format("{}", fmt::join(axes, ", ")), 100)));
   }
   return readings;
 }

@@ -136,7 +136,8 @@ Error unit_needs_release(const RetestState& state, const std::string& serial);
 inline constexpr const char* kStudyKind = "study";
 
 // The readings of a gage study: `quantity` and `axis` as in JudgedQuantity, part = serial, operator
-// = the run's operator. no_input where the store has no such study.
+// = the run's operator. A quantity without axes is found whatever `axis` says. no_input where the
+// store has no such study.
 Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::string& study,
                                                const std::string& quantity,
                                                const std::string& axis);

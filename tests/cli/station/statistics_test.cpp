@@ -88,6 +88,16 @@ TEST_F(StationCommands, StatisticsAndTheGageStudy) {
   EXPECT_EQ(gage.exit_code, 0) << gage.people << gage.out;
   EXPECT_EQ(gage.json()["parts"], 3);
   EXPECT_LT(gage.json()["grr_percent"].get<double>(), 5);
+  for (const char* quantity : {"verification_residual_mg", "tilt_deg"}) {
+    const auto of_all_axes = run({"gage-rr", "--study", "spring", "--quantity", quantity});
+    EXPECT_LE(of_all_axes.exit_code, 1) << quantity << ": " << of_all_axes.people;
+  }
+  const auto not_there = run({"gage-rr", "--study", "spring", "--quantity", "recheck_residual_mg"});
+  EXPECT_EQ(not_there.exit_code, 64);
+  EXPECT_THAT(not_there.people, testing::HasSubstr("of the study have no recheck_residual_mg"));
+  const auto no_axis = run({"gage-rr", "--study", "spring", "--axis", "q"});
+  EXPECT_EQ(no_axis.exit_code, 64);
+  EXPECT_THAT(no_axis.people, testing::HasSubstr("with --axis: x, y, z"));
   const auto statistics =
       run({"statistics", "--by", "station", "--html", folder_ / "s.html", "--json"});
   EXPECT_EQ(statistics.exit_code, 0);
