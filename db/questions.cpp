@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -21,6 +22,11 @@ constexpr std::string_view kStillWithdrawn =
 // The verdicts after which the constants are used.
 bool is_passed(std::string_view verdict) {
   return verdict == "pass" || verdict == "conditional_pass";
+}
+
+// Does a run of this verdict say something about the unit?
+bool is_judged(std::string_view verdict) {
+  return verdict != "stopped" && verdict != "inconclusive";
 }
 
 double share(std::size_t part, std::size_t whole) {
@@ -67,8 +73,30 @@ const Correction* UnitHistory::preference(const std::string& filter) const {
   return last;
 }
 
-double YieldReport::yield() const { return share(passed, units); }
-double YieldReport::first_pass_yield() const { return share(passed_first_time, units); }
+CheckUnitTimes::CheckUnitTimes(const std::vector<StationEvent>& events) {
+  for (const StationEvent& event : events) {
+    if (event.action != "check_unit" && event.action != "check_unit_end") {
+      continue;
+    }
+    std::vector<Period>& periods = of_[event.serial];
+    const bool is_one = !periods.empty() && !periods.back().until;
+    if (event.action == "check_unit" && !is_one) {
+      periods.push_back({event.made_at, std::nullopt});
+    } else if (event.action == "check_unit_end" && is_one) {
+      periods.back().until = event.made_at;
+    }
+  }
+}
+
+bool CheckUnitTimes::hold(const std::string& serial, UtcTime started) const {
+  const auto unit = of_.find(serial);
+  return unit != of_.end() && std::ranges::any_of(unit->second, [&](const Period& period) {
+           return started >= period.from && (!period.until || started < *period.until);
+         });
+}
+
+double YieldReport::yield() const { return share(passed, judged); }
+double YieldReport::first_pass_yield() const { return share(passed_first_time, judged); }
 
 Result<UnitHistory> Store::unit_history(const std::string& serial) {
   // One moment: a run and the constants that it made belong together.
@@ -164,27 +192,32 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
 
 Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   const std::vector<Value> parameters = {to_ns(from), to_ns(to)};
-  // A check unit is measured every day: its runs say nothing of the units that come to the station.
+  SIXPOINT_ASSIGN(const auto events, station_events());
+  const CheckUnitTimes check_unit_times(events);
   SIXPOINT_ASSIGN(
       const auto rows,
-      database_->query("SELECT serial, verdict, retest_of FROM runs WHERE kind = 'jig' "
-                       "AND started_ns >= $1 AND started_ns < $2 "
-                       "AND NOT EXISTS (SELECT 1 FROM station_events e "
-                       "WHERE e.serial = runs.serial AND e.action = 'check_unit' "
-                       "AND NOT EXISTS (SELECT 1 FROM station_events later WHERE later.serial = "
-                       "e.serial AND later.action = 'check_unit_end' AND later.seq > e.seq)) "
-                       "ORDER BY started_ns, seq",
+      database_->query("SELECT serial, verdict, retest_of, started_ns FROM runs WHERE kind = 'jig' "
+                       "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
                        parameters));
   YieldReport report;
-  std::map<std::string, bool> last_passed;  // of each unit
+  std::set<std::string> units;
+  std::map<std::string, bool> last_passed;  // of each unit that was judged
   for (const Row& row : rows) {
-    const bool passed = is_passed(text_of(row[1]));
-    const bool is_first = last_passed.insert_or_assign(text_of(row[0]), passed).second;
-    report.passed_first_time += is_first && passed ? 1 : 0;
+    if (check_unit_times.hold(text_of(row[0]), from_ns(integer_of(row[3])))) {
+      continue;
+    }
+    ++report.runs;
     report.retests += is_null(row[2]) ? 0 : 1;
+    units.insert(text_of(row[0]));
+    const std::string verdict = text_of(row[1]);
+    if (is_judged(verdict)) {
+      const bool passed = is_passed(verdict);
+      const bool is_first = last_passed.insert_or_assign(text_of(row[0]), passed).second;
+      report.passed_first_time += is_first && passed ? 1 : 0;
+    }
   }
-  report.runs = rows.size();
-  report.units = last_passed.size();
+  report.units = units.size();
+  report.judged = last_passed.size();
   for (const auto& [serial, passed] : last_passed) {
     report.passed += passed ? 1 : 0;
   }

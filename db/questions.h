@@ -2,8 +2,10 @@
 // functions are members of Store (store.h); docs/store.md has the SQL statements.
 //
 //   SIXPOINT_ASSIGN(const YieldReport report, store.yield(from, to));
-//   report.yield();   // 0.97: of the units, those whose last run passed
+//   report.yield();   // 0.97: of the units that were judged, those that passed
 #pragma once
+
+#include <map>
 
 #include "db/records.h"
 
@@ -55,14 +57,48 @@ struct JigUnit {
   std::string last_verdict;
 };
 
-// Of the jig runs that started in a period.
+// When units were check units. A check unit is measured every day: its runs say nothing of the units
+// that come to the station, and count in no yield. Of a unit, at whichever station it was named (a
+// check unit may be moved):
+//
+// | decisions about the unit, oldest first | runs that do not count                                |
+// |----------------------------------------|-------------------------------------------------------|
+// | none                                   | none                                                  |
+// | check_unit                             | those that started then or later                      |
+// | check_unit, check_unit_end             | those that started between the two                    |
+// | check_unit, check_unit, check_unit_end | those that started between the first and the last one |
+class CheckUnitTimes {
+ public:
+  explicit CheckUnitTimes(const std::vector<StationEvent>& events);  // oldest first
+  bool hold(const std::string& serial, UtcTime started) const;
+
+ private:
+  struct Period {
+    UtcTime from;
+    std::optional<UtcTime> until;
+  };
+  std::map<std::string, std::vector<Period>> of_;
+};
+
+// Of the jig runs that started in a period, but for those of check units. A run that was stopped or
+// inconclusive judges nothing: it says neither for nor against its unit. The numbers are those of
+// station/statistics/statistics.h.
+//
+// | a unit's runs, oldest first | judged | passed | passed_first_time |
+// |-----------------------------|--------|--------|-------------------|
+// | judge nothing               | no     | no     | no                |
+// | judged first: passed        |        |        | yes               |
+// | judged first: failed        |        |        | no                |
+// | judged last: passed         | yes    | yes    |                   |
+// | judged last: failed         | yes    | no     |                   |
 struct YieldReport {
   std::size_t runs = 0;
   std::size_t retests = 0;  // runs that name the run which they repeat
   std::size_t units = 0;
-  std::size_t passed = 0;             // units whose last run passed
-  std::size_t passed_first_time = 0;  // units whose first run passed
-  double yield() const;               // NaN where there were no units
+  std::size_t judged = 0;
+  std::size_t passed = 0;
+  std::size_t passed_first_time = 0;
+  double yield() const;  // of the units that were judged; NaN where there were none
   double first_pass_yield() const;
 };
 

@@ -1,12 +1,59 @@
 #include "base/text/csv_columns.h"
 
 #include <algorithm>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 namespace sixpoint {
+
+namespace {
+
+struct Line {
+  std::vector<std::string> fields;
+  std::size_t line_ends = 0;  // within quotes
+  bool is_closed = true;      // the last quote
+};
+
+// Takes the next line, with its end, from the front of `csv`. A quote that does not begin a field is
+// a character as any other.
+Line take_line(std::string_view& csv) {
+  Line line;
+  line.fields.emplace_back();
+  bool is_begin = true;    // of a field
+  std::size_t quoted = 0;  // characters of the field that were in quotes: their blanks stay
+  std::size_t at = 0;
+  for (bool is_end = false; at < csv.size() && !is_end; ++at) {
+    const char c = csv[at];
+    std::string& field = line.fields.back();
+    if (!line.is_closed && c == '"' && csv.substr(at + 1).starts_with('"')) {
+      field += c;
+      ++at;
+    } else if (!line.is_closed && c != '"') {
+      field += c;
+      line.line_ends += c == '\n' ? 1 : 0;
+    } else if (!line.is_closed) {
+      line.is_closed = true;
+      quoted = field.size();
+    } else if (c == '"' && is_begin) {
+      line.is_closed = false;
+    } else if (c == ',') {
+      line.fields.emplace_back();
+      quoted = 0;
+    } else if (c == '\n') {
+      is_end = true;
+    } else {
+      field += c;
+    }
+    is_begin = c == ',' && line.is_closed;
+  }
+  csv.remove_prefix(at);
+  std::string& last = line.fields.back();
+  last.erase(std::max(quoted, last.find_last_not_of("\r ") + 1));
+  return line;
+}
+
+}  // namespace
 
 Result<std::vector<CsvRow>> csv_columns(std::string_view csv,
                                         std::span<const std::string_view> names,
@@ -23,18 +70,16 @@ Result<std::vector<CsvRow>> csv_columns(std::string_view csv,
   if (csv.starts_with(kByteOrderMark)) {
     csv.remove_prefix(kByteOrderMark.size());
   }
-  std::istringstream lines{std::string(csv)};
-  for (std::string line; std::getline(lines, line);) {
-    ++line_number;
-    line.erase(line.find_last_not_of("\r ") + 1);
-    std::erase(line, '"');
-    if (line.empty()) {
-      continue;
+  for (std::size_t line_ends = 0; !csv.empty();) {
+    line_number += 1 + line_ends;
+    const Line line = take_line(csv);
+    line_ends = line.line_ends;
+    const std::vector<std::string>& fields = line.fields;
+    if (!line.is_closed) {
+      return wrong("a quote is not closed");
     }
-    std::vector<std::string> fields;
-    std::istringstream cells(line + ",");
-    for (std::string cell; std::getline(cells, cell, ',');) {
-      fields.push_back(std::move(cell));
+    if (fields.size() == 1 && fields[0].empty()) {
+      continue;
     }
     if (line_number == 1) {
       for (const std::string_view name : names) {

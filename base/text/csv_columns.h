@@ -5,8 +5,8 @@
 //   rows[0].fields;  // "MOS1", "A"
 //
 // For what people keep in a spreadsheet: any order of the columns, further columns, empty lines,
-// line ends of any system, a byte-order mark; quotes are dropped, so that a field cannot hold a
-// comma. Pure function; any thread.
+// line ends of any system, a byte-order mark. A field in quotes may hold commas, line ends and
+// quotes (written twice), as RFC 4180 has it and csv_field() writes it. Pure function; any thread.
 #pragma once
 
 #include <span>
@@ -19,12 +19,12 @@
 namespace sixpoint {
 
 struct CsvRow {
-  std::size_t line = 0;             // in the file, from 1
+  std::size_t line = 0;             // where it begins in the file, from 1
   std::vector<std::string> fields;  // in the order of the names that were asked for
 };
 
-// bad_data where a name is not in the first line, a line is too short, or there is no row; `where`
-// names the file.
+// bad_data where a name is not in the first line, a line is too short, a quote is not closed, or
+// there is no row; `where` names the file.
 Result<std::vector<CsvRow>> csv_columns(std::string_view csv,
                                         std::span<const std::string_view> names,
                                         const std::string& where);

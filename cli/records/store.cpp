@@ -255,13 +255,16 @@ Result<Answer> yield(const StoreCommandOptions& options, Context& context) {
   answer.json.update({{"runs", report.runs},
                       {"retests", report.retests},
                       {"units", report.units},
+                      {"judged", report.judged},
                       {"passed", report.passed},
                       {"passed_first_time", report.passed_first_time},
                       {"yield", number(report.yield())},
                       {"first_pass_yield", number(report.first_pass_yield())}});
   answer.text = fmt::format(
-      "{} units in {} runs ({} retests): {} passed, {} of them at the first run\n", report.units,
-      report.runs, report.retests, report.passed, report.passed_first_time);
+      "{} units in {} runs ({} retests), {} units judged: {} passed; {} passed at their first "
+      "judged run\n",
+      report.units, report.runs, report.retests, report.judged, report.passed,
+      report.passed_first_time);
   return answer;
 }
 

@@ -2,6 +2,7 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
@@ -40,7 +41,8 @@ Result<Answer> collect(Context& context, const StatisticsCommandOptions& options
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto runs, station::summaries(store, filter));
   Answer answer;
-  SIXPOINT_ASSIGN(answer.report, station::statistics(runs, options.by));
+  SIXPOINT_ASSIGN(answer.report, station::statistics(runs, options.by,
+                                                     options.limits.empty() ? nullptr : &limits));
   std::set<std::string> stations;
   SIXPOINT_CHECK(store.for_each_run({}, [&](const db::RunRecord& run) -> Status {
     stations.insert(run.station);
@@ -82,6 +84,11 @@ void print_statistics(Context& context, const Answer& answer) {
   for (const auto& [name, one] : answer.report.capabilities) {
     context.text() << fmt::format("  Cpk {:6.2f} ({:.2f} to {:.2f}), n = {}: {}\n", one.cpk,
                                   one.cpk_low, one.cpk_high, one.n, name);
+  }
+  if (!answer.report.limits_differ.empty()) {
+    context.text() << fmt::format(
+        "  no Cpk where units were judged by different limits (--limits FILE names some): {}\n",
+        fmt::join(answer.report.limits_differ, ", "));
   }
   for (const station::StationState& state : answer.states) {
     context.text() << printable(state.brief(), 4000) << '\n';
@@ -158,7 +165,8 @@ void add_statistics(CLI::App& app, Context& context) {
   command.add_option("--html", options.html, "a page with charts");
   add_output_options(command, options.outputs);
   command.add_option("--limits", options.limits,
-                     "a TOML file of limits (docs/limits.md); else the built-in ones");
+                     "a TOML file (docs/limits.md): its limits for Cpk, its policy for check "
+                     "units; else those of the runs, and the built-in policy");
   add_store_option(command, options.store);
 }
 
@@ -171,7 +179,8 @@ void add_gage_rr(CLI::App& app, Context& context) {
                                   "... or the runs of 'sixpoint jig --study NAME' in the store");
   file->excludes(name);
   command.add_option("--quantity", options.quantity, "of the runs")->capture_default_str();
-  command.add_option("--axis", options.axis, "of the quantity")->capture_default_str();
+  command.add_option("--axis", options.axis, "of the quantity, where it has axes")
+      ->capture_default_str();
   command.add_option("--tolerance", options.tolerance, "width of the specification")
       ->check(greater_than_zero());
   add_store_option(command, options.store);

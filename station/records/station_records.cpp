@@ -93,10 +93,10 @@ RunSummary summary_of(const db::RunRecord& run) {
 
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
-  const std::set<std::string> check_units = check_units_of(events);
+  const db::CheckUnitTimes check_unit_times(events);
   std::vector<RunSummary> out;
   SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-    if (!check_units.contains(run.serial)) {
+    if (!check_unit_times.hold(run.serial, run.started)) {
       out.push_back(summary_of(run));
     }
     return {};
@@ -489,6 +489,7 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
                 "'sixpoint limits print' shows what is");
   }
   std::vector<GageReading> readings;
+  std::set<std::string> axes;  // that the quantity has in these runs
   bool known = false;
   db::RunFilter filter;
   filter.kind = kStudyKind;
@@ -498,7 +499,14 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
       return {};
     }
     known = true;
-    if (const auto value = value_in(summary_of(run), quantity, axis)) {
+    const RunSummary summary = summary_of(run);
+    for (const JudgedQuantity& each : summary.quantities) {
+      if (each.name == quantity) {
+        axes.insert(each.axis);
+      }
+    }
+    const bool has_no_axes = axes == std::set<std::string>{""};
+    if (const auto value = value_in(summary, quantity, has_no_axes ? "" : axis)) {
       readings.push_back({run.serial, run.operator_name, *value});
     }
     return {};
@@ -508,10 +516,15 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
                 fmt::format("the store has no runs of the study '{}'", printable(study, 60)), {},
                 "measure them with 'sixpoint jig --study NAME --operator WHO'");
   }
+  if (axes.empty()) {
+    return fail(ErrorCode::usage, fmt::format("the runs of the study have no {}", quantity), {},
+                "take another --quantity");
+  }
   if (readings.empty()) {
     return fail(ErrorCode::usage,
                 fmt::format("the runs have no {} of axis '{}'", quantity, printable(axis, 20)), {},
-                "name one of its axes with --axis");
+                fmt::format("name one of its axes with --axis: {}",
+                            printable(fmt::format("{}", fmt::join(axes, ", ")), 100)));
   }
   return readings;
 }

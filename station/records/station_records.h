@@ -28,7 +28,8 @@ namespace sixpoint::station {
 
 RunSummary summary_of(const db::RunRecord& run);
 
-// Of the runs that `filter` selects, without those of check units. Oldest first.
+// Of the runs that `filter` selects, without those of check units (db::CheckUnitTimes). Oldest
+// first.
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter);
 
 // Runs that started on or after the day `from` ("2027-03-31") and before the day `to`; empty: no
@@ -139,7 +140,8 @@ Error unit_needs_release(const RetestState& state, const std::string& serial);
 inline constexpr const char* kStudyKind = "study";
 
 // The readings of a gage study: `quantity` and `axis` as in JudgedQuantity, part = serial, operator
-// = the run's operator. no_input where the store has no such study.
+// = the run's operator. A quantity without axes is found whatever `axis` says. no_input where the
+// store has no such study.
 Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::string& study,
                                                const std::string& quantity,
                                                const std::string& axis);

@@ -202,6 +202,10 @@ std::string statistics_html(const StatisticsReport& report,
         one.cp ? fmt::format("{:.2f}", *one.cp) : "\u2013", one.cpk, one.cpk_low, one.cpk_high);
   }
   html += "</tbody></table>\n";
+  for (const std::string& name : report.limits_differ) {
+    html += fmt::format("<p>{}: no Cpk, for units were judged by different limits.</p>\n",
+                        html_escaped(title_of(name)));
+  }
   for (const StationState& state : states) {
     html +=
         fmt::format("<h2>Check units: {}</h2>\n<p class={}>{}</p>\n",

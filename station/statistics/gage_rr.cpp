@@ -166,9 +166,9 @@ Json json_of(const std::vector<AnovaRow>& rows) {
 }  // namespace
 
 std::string_view GageReport::judgement() const {
-  return grr_percent < 10    ? "good"
-         : grr_percent <= 30 ? "may do, depending on what it is for"
-                             : "not good enough";
+  return !usable()          ? "not good enough"
+         : grr_percent < 10 ? "good"
+                            : "may do, depending on what it is for";
 }
 
 Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageOptions& options) {
@@ -186,6 +186,10 @@ Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageO
                 "needs another noise=N each time");
   }
   const SumsOfSquares sums = sums_of_squares(study);
+  if (!std::isfinite(sums.parts + sums.operators + sums.interaction + sums.repeatability)) {
+    return fail(ErrorCode::bad_data, "the readings are too large to be computed with", "gage study",
+                "take another unit, or look at the values");
+  }
 
   GageReport report;
   report.parts = static_cast<int>(study.parts.size());

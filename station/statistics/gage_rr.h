@@ -61,7 +61,14 @@ struct GageReport {
   double grr_percent = 0;  // of total variation, as standard deviations
   std::optional<double> grr_percent_of_tolerance;
   int ndc = 0;  // distinct categories
-  // AIAG: under 10 % good, to 30 % by application, above that not.
+  // AIAG's two conditions:
+  //
+  // | %GRR of total variation | categories  | judgement                            | usable |
+  // |-------------------------|-------------|--------------------------------------|--------|
+  // | under 10                | five, more  | good                                 | yes    |
+  // | to 30                   | five, more  | may do, depending on what it is for  | yes    |
+  // | to 30                   | fewer       | not good enough                      | no     |
+  // | above 30                | any         | not good enough                      | no     |
   std::string_view judgement() const;
   bool usable() const { return grr_percent <= 30 && ndc >= 5; }
   std::string brief() const;
@@ -71,7 +78,8 @@ struct GageReport {
 // twice; at least two of each. bad_data otherwise, naming what is missing.
 Result<GageReport> gage_rr(const std::vector<GageReading>& readings,
                            const GageOptions& options = {});
-// Columns part, operator, value (in any order, a header names them), comma separated.
+// Columns part, operator, value (in any order, a header names them), comma separated, with quotes as
+// RFC 4180 has them.
 Result<std::vector<GageReading>> parse_gage_csv(std::string_view csv, const std::string& where);
 
 }  // namespace sixpoint::station

@@ -186,8 +186,8 @@ Json json_of(const GroupStatistics& group) {
 }
 
 // Of every unit its last complete run: repeated runs of one unit say nothing about the other units.
-std::vector<std::pair<std::string, Capability>> capabilities_of(
-    const std::vector<RunSummary>& runs) {
+void add_capabilities(const std::vector<RunSummary>& runs, const Limits* limits,
+                      StatisticsReport& report) {
   std::map<std::string, const RunSummary*> last;
   for (const RunSummary& run : runs) {
     if (!run.quantities.empty()) {
@@ -198,6 +198,7 @@ std::vector<std::pair<std::string, Capability>> capabilities_of(
     std::string name;
     std::vector<double> values;
     std::optional<double> low, high;
+    bool limits_differ = false;
   };
   std::vector<Series> all;  // in the order of the first report
   for (const auto& [serial, run] : last) {
@@ -206,28 +207,30 @@ std::vector<std::pair<std::string, Capability>> capabilities_of(
           quantity.axis.empty() ? quantity.name : quantity.name + " " + quantity.axis;
       auto one = std::find_if(all.begin(), all.end(),
                               [&](const Series& series) { return series.name == name; });
+      const auto low = limits == nullptr ? quantity.low : limits->of(quantity.name).low;
+      const auto high = limits == nullptr ? quantity.high : limits->of(quantity.name).high;
       if (one == all.end()) {
-        one = all.insert(one, {name, {}, {}, {}});
+        one = all.insert(one, {name, {}, low, high});
       }
       if (std::isfinite(quantity.value)) {
         one->values.push_back(quantity.value);
       }
-      one->low = quantity.low;
-      one->high = quantity.high;
+      one->limits_differ = one->limits_differ || one->low != low || one->high != high;
     }
   }
-  std::vector<std::pair<std::string, Capability>> out;
   for (const Series& one : all) {
-    if (const auto found = capability(one.values, one.low, one.high)) {
-      out.emplace_back(one.name, *found);
+    if (one.limits_differ) {
+      report.limits_differ.push_back(one.name);
+    } else if (const auto found = capability(one.values, one.low, one.high)) {
+      report.capabilities.emplace_back(one.name, *found);
     }
   }
-  return out;
 }
 
 }  // namespace
 
-Result<StatisticsReport> statistics(const std::vector<RunSummary>& runs, const std::string& by) {
+Result<StatisticsReport> statistics(const std::vector<RunSummary>& runs, const std::string& by,
+                                    const Limits* limits) {
   const auto key_of = [&](const RunSummary& run) -> const std::string& {
     return by == "station"    ? run.station
            : by == "jig"      ? run.jig
@@ -252,7 +255,7 @@ Result<StatisticsReport> statistics(const std::vector<RunSummary>& runs, const s
   for (const auto& [name, members] : groups) {
     report.groups.push_back(group_of(name, members));
   }
-  report.capabilities = capabilities_of(runs);
+  add_capabilities(runs, limits, report);
   return report;
 }
 
@@ -278,6 +281,7 @@ Json StatisticsReport::to_json() const {
   for (const auto& [name, one] : capabilities) {
     json["capability"][name] = one.to_json();
   }
+  json["limits_differ"] = limits_differ;
   return json;
 }
 

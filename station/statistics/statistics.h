@@ -85,13 +85,21 @@ struct StatisticsReport {
   std::string by;  // "station", "jig", "operator", "firmware"; empty: one group
   GroupStatistics all;
   std::vector<GroupStatistics> groups;
-  // Of the last run of every unit: one per quantity and axis.
+  // Of the last complete run of every unit: one per quantity and axis.
   std::vector<std::pair<std::string, Capability>> capabilities;
+  std::vector<std::string> limits_differ;  // quantities that have no capability for that reason
 
   std::string brief() const;
   nlohmann::ordered_json to_json() const;
 };
-// usage for an unknown `by`. `runs`: oldest first.
-Result<StatisticsReport> statistics(const std::vector<RunSummary>& runs, const std::string& by);
+// usage for an unknown `by`. `runs`: oldest first. A quantity's capability goes by these limits:
+//
+// | `limits` | its runs were judged by | capability                                |
+// |----------|-------------------------|-------------------------------------------|
+// | given    | any                     | by the given ones                         |
+// | none     | the same low and high   | by these                                  |
+// | none     | different ones          | none; the quantity is in `limits_differ`  |
+Result<StatisticsReport> statistics(const std::vector<RunSummary>& runs, const std::string& by,
+                                    const Limits* limits = nullptr);
 
 }  // namespace sixpoint::station

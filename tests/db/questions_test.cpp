@@ -36,17 +36,17 @@ TEST_F(StoreTest, AnswersWhatPeopleAsk) {
   EXPECT_DOUBLE_EQ(yield->first_pass_yield(), 1.0 / 3);
   EXPECT_TRUE(std::isnan(store.yield(from_unix_seconds(0), from_unix_seconds(1))->yield()));
 
-  // A check unit does not count, as long as it is one.
+  // The runs of a check unit do not count, also when it is one no more.
   StationEvent event;
   event.serial = "C";
-  event.action = "check_unit";
   event.operator_name = "Eve";
   event.reason = "golden";
-  ASSERT_OK(store.add_station_event(event));
-  EXPECT_EQ(store.yield(from_unix_seconds(0), from_unix_seconds(5000))->units, 2U);
-  event.action = "check_unit_end";
-  ASSERT_OK(store.add_station_event(event));
-  EXPECT_EQ(store.yield(from_unix_seconds(0), from_unix_seconds(5000))->units, 3U);
+  for (const auto& [action, time_s] : {std::pair("check_unit", 1150), {"check_unit_end", 1250}}) {
+    event.action = action;
+    memory_.clock.set(from_unix_seconds(time_s));
+    ASSERT_OK(store.add_station_event(event));
+    EXPECT_EQ(store.yield(from_unix_seconds(0), from_unix_seconds(5000))->units, 2U) << action;
+  }
 
   const auto of_jig = store.units_of_jig("J1");
   ASSERT_EQ(of_jig->size(), 3U);
@@ -107,6 +107,40 @@ TEST_F(StoreTest, AnswersWhatPeopleAsk) {
   EXPECT_FALSE((*due)[0].last_constants.has_value());
   EXPECT_EQ((*due)[1].serial, "D");
   EXPECT_EQ((*due)[2].serial, "B");
+}
+
+// The rows of the table of the header.
+TEST(CheckUnitTimes, FollowTheTable) {
+  std::vector<StationEvent> events;
+  const auto decide = [&](const std::string& action, std::int64_t time_s,
+                          const std::string& station) {
+    events.push_back({"", from_unix_seconds(time_s), station, "A", action, "Eve", "why"});
+  };
+  const auto held = [&](const std::string& serial = "A") {  // of the runs at 5, 10, 15 ... 35
+    const CheckUnitTimes times(events);
+    std::vector<int> seconds;
+    for (int time_s = 5; time_s <= 35; time_s += 5) {
+      if (times.hold(serial, from_unix_seconds(time_s))) {
+        seconds.push_back(time_s);
+      }
+    }
+    return seconds;
+  };
+  using Seconds = std::vector<int>;
+  decide("release", 5, "1");
+  EXPECT_EQ(held(), Seconds());
+  decide("check_unit", 10, "1");
+  EXPECT_EQ(held(), (Seconds{10, 15, 20, 25, 30, 35}));
+  EXPECT_EQ(held("B"), Seconds());
+  decide("check_unit_end", 20, "2");
+  EXPECT_EQ(held(), (Seconds{10, 15}));
+  decide("check_unit", 30, "2");
+  EXPECT_EQ(held(), (Seconds{10, 15, 30, 35}));
+  events.pop_back();
+  events.pop_back();
+  decide("check_unit", 15, "2");
+  decide("check_unit_end", 25, "2");
+  EXPECT_EQ(held(), (Seconds{10, 15, 20}));
 }
 
 TEST(UnitHistory, IsEmptyWhereNothingIsKnownOfTheUnit) {

@@ -67,6 +67,7 @@ TEST_F(StoreTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(yield["retests"], 1);
   EXPECT_EQ(yield["units"], 1);
+  EXPECT_EQ(yield["judged"], 1);
 }
 
 TEST_F(StoreTest, HistoryListsTheRecordsOfAUnit) {

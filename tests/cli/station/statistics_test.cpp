@@ -33,6 +33,25 @@ TEST_F(CommandTest, StatisticsCountsTheRunsOfTheStore) {
   EXPECT_EQ(run({"statistics", "--store", path("none.db")}).exit_code, 66);
 }
 
+// Two units that were judged by different limits of zero alone.
+TEST_F(StationCommands, CpkNeedsOneSetOfLimits) {
+  write("wide.toml", "[zero_offset_mg]\nlow = -2000\nhigh = 2000\n");
+  const std::vector<std::string> wide = {"--limits", folder_ / "wide.toml"};
+  ASSERT_EQ(measure("seed=1").exit_code, 0);
+  ASSERT_EQ(measure("seed=2", wide).exit_code, 0);
+  const auto without = run({"statistics", "--json"});
+  EXPECT_EQ(without.exit_code, 0);
+  EXPECT_EQ(without.json()["limits_differ"],
+            cli::Json::array({"zero_offset_mg x", "zero_offset_mg y", "zero_offset_mg z"}));
+  EXPECT_FALSE(without.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_TRUE(without.json()["capability"].contains("noise_mg x"));
+  EXPECT_THAT(run({"statistics"}).out,
+              testing::HasSubstr("(--limits FILE names some): zero_offset_mg x, zero_offset_mg y"));
+  const auto with = run({"statistics", "--limits", folder_ / "wide.toml", "--json"});
+  EXPECT_TRUE(with.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_TRUE(with.json()["limits_differ"].empty());
+}
+
 // Two parts, two operators, two readings each, 0.01 apart, on parts that are 1 apart.
 TEST_F(CommandTest, GageRrReadsItsTable) {
   std::ofstream csv(path("g.csv"));
@@ -69,6 +88,16 @@ TEST_F(StationCommands, StatisticsAndTheGageStudy) {
   EXPECT_EQ(gage.exit_code, 0) << gage.people << gage.out;
   EXPECT_EQ(gage.json()["parts"], 3);
   EXPECT_LT(gage.json()["grr_percent"].get<double>(), 5);
+  for (const char* quantity : {"verification_residual_mg", "tilt_deg"}) {
+    const auto of_all_axes = run({"gage-rr", "--study", "spring", "--quantity", quantity});
+    EXPECT_LE(of_all_axes.exit_code, 1) << quantity << ": " << of_all_axes.people;
+  }
+  const auto not_there = run({"gage-rr", "--study", "spring", "--quantity", "recheck_residual_mg"});
+  EXPECT_EQ(not_there.exit_code, 64);
+  EXPECT_THAT(not_there.people, testing::HasSubstr("of the study have no recheck_residual_mg"));
+  const auto no_axis = run({"gage-rr", "--study", "spring", "--axis", "q"});
+  EXPECT_EQ(no_axis.exit_code, 64);
+  EXPECT_THAT(no_axis.people, testing::HasSubstr("with --axis: x, y, z"));
   const auto statistics =
       run({"statistics", "--by", "station", "--html", folder_ / "s.html", "--json"});
   EXPECT_EQ(statistics.exit_code, 0);

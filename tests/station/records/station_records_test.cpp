@@ -222,6 +222,60 @@ TEST_F(StationRecords, CheckUnitsAndStudiesAreNoStatistics) {
   EXPECT_EQ((*runs)[0].quantities.size(), 6U);
 }
 
+// Oracle: counted by hand. What a unit was before and after it checked the station counts.
+TEST_F(StationRecords, ARunOfACheckUnitNeverCountsAndItsOtherRunsAlwaysDo) {
+  add_run("UNIT1", JigVerdict::pass);
+  decide("check_unit", "UNIT1");
+  add_run("UNIT1", JigVerdict::fail);
+  add_run("UNIT1", JigVerdict::fail, 100, "B");
+  decide("check_unit_end", "UNIT1");
+  add_run("MOS2A1", JigVerdict::pass);
+  const auto runs = summaries(store_, {});
+  ASSERT_OK(runs);
+  ASSERT_EQ(runs->size(), 2U);
+  EXPECT_EQ((*runs)[0].serial, "UNIT1");
+  EXPECT_EQ((*runs)[1].serial, "MOS2A1");
+  const auto report = statistics(*runs, "");
+  EXPECT_EQ(report->all.yield.count, 2U);
+  EXPECT_TRUE(report->all.failure_codes.empty());
+  const auto yield = store_.yield(UtcTime::min(), UtcTime::max());
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->runs, 2U);
+  EXPECT_EQ(yield->passed, 2U);
+}
+
+// Oracle: the rows of the table of YieldReport, counted by hand; the two commands that say a yield.
+TEST_F(StationRecords, TheYieldOfTheStoreIsThatOfTheStatistics) {
+  add_run("NEVER", JigVerdict::stopped);
+  add_run("NEVER", JigVerdict::inconclusive);
+  add_run("FIRST", JigVerdict::pass);
+  add_run("FIRST", JigVerdict::inconclusive);
+  add_run("SECOND", JigVerdict::stopped);
+  add_run("SECOND", JigVerdict::conditional_fail);
+  add_run("SECOND", JigVerdict::conditional_pass);
+  add_run("LATER", JigVerdict::inconclusive);
+  add_run("LATER", JigVerdict::pass);
+  add_run("LOST", JigVerdict::pass);
+  add_run("LOST", JigVerdict::fail);
+  add_run("LOST", JigVerdict::stopped);
+  const auto yield = store_.yield(UtcTime::min(), UtcTime::max());
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->judged, 4U);
+  EXPECT_EQ(yield->passed, 3U);
+  EXPECT_EQ(yield->passed_first_time, 3U);
+  const auto runs = summaries(store_, {});
+  ASSERT_OK(runs);
+  const auto all = statistics(*runs, "")->all;
+  EXPECT_EQ(all.runs, yield->runs);
+  EXPECT_EQ(all.units, yield->units);
+  EXPECT_EQ(all.yield.of, yield->judged);
+  EXPECT_EQ(all.yield.count, yield->passed);
+  EXPECT_EQ(all.first_pass_yield.of, yield->judged);
+  EXPECT_EQ(all.first_pass_yield.count, yield->passed_first_time);
+  EXPECT_EQ(all.yield.value(), yield->yield());
+  EXPECT_EQ(all.first_pass_yield.value(), yield->first_pass_yield());
+}
+
 TEST_F(StationRecords, AGageStudyIsReadBackByItsName) {
   Random random(7);
   for (int part = 0; part < 5; ++part) {

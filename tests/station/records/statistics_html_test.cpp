@@ -101,6 +101,9 @@ TEST(StatisticsPage, ACapabilityHasItsIntervalAndNoCpWithoutTwoLimits) {
                         "<small>(0.71 to 1.95)</small></td>"));
   report.capabilities[0].second.cp = 1.5;
   EXPECT_THAT(statistics_html(report, {}), HasSubstr("<td>1.50</td><td>1.33 "));
+  EXPECT_THAT(statistics_html(report, {}), Not(HasSubstr("different limits")));
+  report.limits_differ = {"zero_offset_mg y"};
+  EXPECT_THAT(statistics_html(report, {}), HasSubstr("no Cpk, for units were judged by different"));
 }
 
 // Nothing that no one measured: a dash, not "nan".

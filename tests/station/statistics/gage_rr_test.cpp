@@ -61,8 +61,31 @@ TEST(GageRr, AiagsExample) {
   EXPECT_NEAR(report->part_variance, 1.08645, 5e-6);
   EXPECT_NEAR(report->grr_percent, 27.86, 5e-3);
   EXPECT_EQ(report->ndc, 4);
-  EXPECT_EQ(report->judgement(), "may do, depending on what it is for");
+  EXPECT_EQ(report->judgement(), "not good enough");
   EXPECT_FALSE(report->usable()) << "fewer than five categories";
+}
+
+// The rows of the table of the header.
+TEST(GageRr, TheJudgementFollowsTheTable) {
+  struct Case {
+    double percent;
+    int categories;
+    std::string judgement;
+    bool usable;
+  };
+  for (const Case& each : {Case{9.9, 14, "good", true},
+                           {10, 14, "may do, depending on what it is for", true},
+                           {27.1, 5, "may do, depending on what it is for", true},
+                           {27.86, 4, "not good enough", false},
+                           {30, 5, "may do, depending on what it is for", true},
+                           {30.1, 5, "not good enough", false},
+                           {80, 1, "not good enough", false}}) {
+    GageReport report;
+    report.grr_percent = each.percent;
+    report.ndc = each.categories;
+    EXPECT_EQ(report.judgement(), each.judgement) << each.percent;
+    EXPECT_EQ(report.usable(), each.usable) << each.percent;
+  }
 }
 
 // Without pooling the components are those of the full table. Oracle: expected mean squares, by
@@ -89,6 +112,15 @@ TEST(GageRr, WhatIsNoStudyIsRefused) {
   EXPECT_FAILS(gage_rr({{"1", "A", 1}, {"1", "B", 1}, {"2", "A", 1}, {"2", "B", 1}}),
                ErrorCode::bad_data);
   EXPECT_FAILS(gage_rr({{"1", "A", 1}, {"1", "B", std::nan("")}}), ErrorCode::bad_data);
+  for (const double factor : {1e154, 1e200, 1e307}) {
+    std::vector<GageReading> large = aiag();
+    for (auto& reading : large) {
+      reading.value *= factor;
+    }
+    const auto refused = gage_rr(large);
+    EXPECT_FAILS(refused, ErrorCode::bad_data);
+    EXPECT_THAT(refused.error().what, testing::HasSubstr("too large")) << factor;
+  }
   std::vector<GageReading> alike = aiag();
   for (auto& reading : alike) {
     reading.value = 1;
@@ -117,6 +149,12 @@ TEST(GageCsv, ColumnsInAnyOrder) {
   EXPECT_EQ((*readings)[1].part, "8");
   EXPECT_EQ((*readings)[1].operator_name, "Bo");
   EXPECT_EQ((*readings)[1].value, -0.2);
+  const auto quoted =
+      parse_gage_csv("part,operator,value\n\"7, left\",\"Lovelace, Ada\",\"1.5\"", "f");
+  ASSERT_OK(quoted);
+  EXPECT_EQ((*quoted)[0].part, "7, left");
+  EXPECT_EQ((*quoted)[0].operator_name, "Lovelace, Ada");
+  EXPECT_EQ((*quoted)[0].value, 1.5);
   for (const char* bad : {"", "part,value\n1,2\n", "part,operator,value\n",
                           "part,operator,value\n1,A\n", "part,operator,value\n1,A,x\n",
                           "part,operator,value\n1,A,nan\n", "part,operator,value\n1,A,1.5mg\n"}) {

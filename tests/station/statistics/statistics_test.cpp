@@ -128,5 +128,38 @@ TEST(Statistics, CapabilityIsOfUnitsAndNotOfTheirRepeats) {
   EXPECT_NEAR(report->capabilities[0].second.mean, 4.2, 1e-12);
 }
 
+// The rows of the table of statistics(). Oracle: Cpk by hand, (high - mean) / (3 sd) of the values
+// 4, 5 and 6: mean 5, sd 1; the built-in limit is 10.
+TEST(Statistics, CapabilityGoesByTheLimitsThatAreNamedOrByThoseOfAllRuns) {
+  const auto runs_with = [](const std::vector<double>& highs) {
+    std::vector<RunSummary> runs;
+    for (std::size_t i = 0; i < highs.size(); ++i) {
+      runs.push_back(run_of(std::to_string(i), JigVerdict::pass, "A"));
+      runs.back().quantities.push_back({"noise_mg", "x", 4 + static_cast<double>(i), 0,
+                                        std::nullopt, highs[i], 0, JigVerdict::pass, ""});
+    }
+    return runs;
+  };
+  const auto cpk = [](const Result<StatisticsReport>& report) {
+    return report->capabilities.empty() ? -1 : report->capabilities[0].second.cpk;
+  };
+  const Limits limits = default_limits();
+  ASSERT_EQ(limits.of("noise_mg").high, 10);
+  for (const std::vector<double>& highs : {std::vector<double>{8, 8, 8}, {8, 8, 11}, {11, 8, 8}}) {
+    const auto by_given = statistics(runs_with(highs), "", &limits);
+    EXPECT_NEAR(cpk(by_given), 5.0 / 3, 1e-12);
+    EXPECT_TRUE(by_given->limits_differ.empty());
+  }
+  const auto by_shared = statistics(runs_with({8, 8, 8}), "");
+  EXPECT_NEAR(cpk(by_shared), 1, 1e-12);
+  EXPECT_TRUE(by_shared->limits_differ.empty());
+  for (const std::vector<double>& highs : {std::vector<double>{8, 8, 11}, {11, 8, 8}}) {
+    const auto differing = statistics(runs_with(highs), "");
+    EXPECT_TRUE(differing->capabilities.empty());
+    EXPECT_EQ(differing->limits_differ, std::vector<std::string>{"noise_mg x"});
+    EXPECT_EQ(differing->to_json()["limits_differ"][0], "noise_mg x");
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::station
