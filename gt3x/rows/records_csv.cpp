@@ -40,6 +40,8 @@ Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink
     return fail(ErrorCode::bad_data, "info.txt names no start", recording.path(),
                 "download the recording from the unit again");
   }
+  const std::string serial = recording.info().serial();
+  SIXPOINT_CHECK(sink(old_lux(serial, 0) ? "time,unix_s,lux\n" : "time,unix_s,lux_raw\n"));
   SIXPOINT_ASSIGN(const auto source, recording.open_entry("lux.bin"));
   RecordsCsvTally tally;
   Bytes bytes(std::size_t{64} * 1024);
@@ -50,10 +52,10 @@ Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink
     std::string text;
     std::size_t used = 0;
     for (; used + 2 <= held; used += 2) {
-      SIXPOINT_ASSIGN(const auto rows,
-                      small_record_rows(static_cast<std::uint8_t>(RecordType::lux),
-                                        std::span(bytes).subspan(used, 2), std::nullopt));
-      text += lines_of(to_unix_seconds(*start) + static_cast<std::int64_t>(tally.records), rows);
+      const int reading = bytes[used] | (bytes[used + 1] << 8);
+      const std::string value = fmt::format("{}", old_lux(serial, reading).value_or(reading));
+      text +=
+          lines_of(to_unix_seconds(*start) + static_cast<std::int64_t>(tally.records), {{value}});
       ++tally.records;
     }
     SIXPOINT_CHECK(sink(text));
@@ -94,10 +96,10 @@ Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t typ
     SIXPOINT_CHECK(sink(header + "\n"));
     return write_old_battery(recording, sink);
   }
-  const bool old_lux = !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
-                       recording.has_entry("lux.bin");
-  if (old_lux) {
-    SIXPOINT_CHECK(sink(header + "\n"));
+  const bool has_old_lux = !recording.has_log() &&
+                           type == static_cast<std::uint8_t>(RecordType::lux) &&
+                           recording.has_entry("lux.bin");
+  if (has_old_lux) {
     return write_old_lux(recording, sink);
   }
   SIXPOINT_ASSIGN(LogReader log, recording.open_log());

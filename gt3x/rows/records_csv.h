@@ -11,7 +11,8 @@
 // The first line names the columns: time (ISO 8601, by the recording's own clock), unix_s, and
 // those of gt3x/forms/small_records.h. Records come in the order of the file. Of the old form (no
 // records) LUX is read from lux.bin, one value a second from the start on, and BATTERY from
-// battery.bin.
+// battery.bin. Readings of lux.bin are lux by old_lux(); where that is not known, they stand as they
+// are under `lux_raw`.
 #pragma once
 
 #include <cstdint>
