@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/bytes.h"
-#include "base/time.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -160,9 +159,12 @@ Clock which_clock(const ClockEvidence& evidence) {
 }
 
 std::string clock_time(const Clock& clock, std::int64_t unix_s) {
+  return clock_time(clock, from_unix_seconds(unix_s));
+}
+
+std::string clock_time(const Clock& clock, UtcTime time) {
   const bool shifted = clock.kind == ClockKind::utc && clock.offset_minutes;
-  std::string text = to_iso8601(
-      from_unix_seconds(unix_s + (shifted ? std::int64_t{60} * *clock.offset_minutes : 0)));
+  std::string text = to_iso8601(time + std::chrono::minutes(shifted ? *clock.offset_minutes : 0));
   if (clock.kind == ClockKind::utc && !clock.offset_minutes) {
     return text;
   }

@@ -63,6 +63,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
       trace.magnitude_g_[first + i] = static_cast<float>(std::sqrt(square) / *scale);
     }
   }
+  trace.clock_ = reader.clock();
   if (trace.magnitude_g_.empty()) {
     return fail(ErrorCode::bad_data, "the recording holds no samples", path,
                 "check that the unit was started; download the recording again");

@@ -89,6 +89,19 @@ TEST(RecordsCsv, TemperaturesAreTheVendors) {
   }
 }
 
+// As `export --time` has them: a Z where the recording's clock is UTC, which raw counts tell.
+TEST(RecordsCsv, TimesByUtcAreSaidToBe) {
+  MemoryEnv memory;
+  Bytes log;
+  append_record(log, RecordType::battery, tests::kStart, Bytes{0x68, 0x10});
+  append_record(log, RecordType::activity3, tests::kStart, Bytes(9));
+  ASSERT_OK(tests::put_recording(memory.files, "a.agdc", log));
+  const auto battery = records_of(memory.files, "a.agdc", RecordType::battery);
+  ASSERT_OK(battery);
+  EXPECT_EQ(battery->lines, (std::vector<std::string>{"time,unix_s,battery_v",
+                                                      "2015-04-09T14:04:00Z,1428588240,4.2"}));
+}
+
 // Oracle: the example of the vendor's description (lux.bin.md): 0, 19, 65535, 2200 and 1100 of a
 // GT3X+ are 0, 0, 0, 2500 and 1375 lux. What the readings of another unit are is not public.
 TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
