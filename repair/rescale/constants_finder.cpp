@@ -62,6 +62,11 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
         drift.low_c, drift.high_c, drift.zero_mg_per_c[0], drift.zero_mg_per_c[1],
         drift.zero_mg_per_c[2]));
   }
+  for (std::string why : {why_not_lent(survey), why_legacy_repairs_none(survey.facts)}) {
+    if (!why.empty()) {
+      report.notes.push_back(std::move(why));
+    }
+  }
   return report;
 }
 

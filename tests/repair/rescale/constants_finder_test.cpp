@@ -127,6 +127,21 @@ TEST_F(Finder, ACalibrationFileThatIsMissingIsAReasonAndNoError) {
   expect_none(options, "cannot be used");
 }
 
+// The command and Python print these notes and no others.
+TEST_F(Finder, TheNotesSayWhatTheConstantsAreNotFor) {
+  const auto notes_of = [&](const char* firmware) {
+    Survey found = survey_;
+    found.facts.firmware = firmware;
+    return testing::PrintToString(solve_survey("in.gt3x", found, {}).value().notes);
+  };
+  EXPECT_THAT(notes_of("1.3.0"), HasSubstr("(firmware 1.3.0 chose it): its constants repair no"));
+  EXPECT_THAT(notes_of("1.5.0"), testing::Not(HasSubstr("repair no")));
+  Survey two = survey_;
+  two.facts.other_firmware = "1.6.0";
+  EXPECT_THAT(testing::PrintToString(solve_survey("in.gt3x", two, {}).value().notes),
+              HasSubstr("1.5.0 and 1.6.0, which lay the axes"));
+}
+
 TEST_F(Finder, ARepairedRecordingIsNotSolved) {
   Survey repaired = survey_;
   repaired.already_repaired = true;
