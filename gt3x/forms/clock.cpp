@@ -146,7 +146,7 @@ Clock which_clock(const ClockEvidence& evidence) {
     return local("there is a METADATA record LocalTimeLog, and it does not say that UTC was used");
   }
   if (evidence.raw_counts) {
-    return utc("the recording holds raw counts, as CentrePoint writes them, which uses UTC");
+    return utc("the recording is an .agdc, which CentrePoint writes, and it uses UTC");
   }
   if (evidence.old_form) {
     return local("units of the old form have the clock of the computer that set them");
