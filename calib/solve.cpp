@@ -147,6 +147,21 @@ Status solve_with_prior(SolveReport& report, const Input& in) {
   return finish_constants(report, in.options);
 }
 
+double residual_before_mg(std::span<const DirectionCell> cells, const Input& in) {
+  if (!in.options.file_g) {
+    return cells_rms_mg(cells, in.file_constants, in.options.gravity_g);
+  }
+  std::vector<DirectionCell> in_g(cells.begin(), cells.end());
+  for (DirectionCell& cell : in_g) {
+    cell.mean_lsb = in.options.file_g(cell.mean_lsb);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const double g_per_lsb = in.file_constants.sensitivity_g_per_lsb[a];
+      cell.variance_lsb2[a] *= g_per_lsb * g_per_lsb;
+    }
+  }
+  return cells_rms_mg(in_g, Calibration{{1, 1, 1}, {}}, in.options.gravity_g);
+}
+
 // A report without verified constants: what the data determine nevertheless.
 Result<SolveReport> undetermined(SolveReport report, Verdict verdict, std::string reason,
                                  const Input& in) {
@@ -296,7 +311,7 @@ Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& 
   report.iterations =
       by_search ? static_cast<int>(report.search->fitness_mg.size()) : report.fit->fit.iterations;
   SIXPOINT_CHECK(finish_constants(report, options));
-  report.residual_before_mg = cells_rms_mg(report.fit->cells, in.file_constants, options.gravity_g);
+  report.residual_before_mg = residual_before_mg(report.fit->cells, in);
   report.verification = verify(in.blocks, in.file_constants, sensors, *report.fit, report.search,
                                in.fit_options(), report.calibration);
   if (by_search) {
@@ -362,8 +377,7 @@ Result<SolveReport> solve_input(const Input& in) {
         "no still block of 4 s was found; lay the unit on each of its six sides for a minute");
     return report;
   }
-  report.residual_before_mg =
-      cells_rms_mg(cells_of(in.blocks), in.file_constants, in.options.gravity_g);
+  report.residual_before_mg = residual_before_mg(cells_of(in.blocks), in);
   if (!report.coverage.complete()) {
     SIXPOINT_ASSIGN(auto exposed, solve_exposed(report, in));
     if (exposed) {

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -48,6 +49,9 @@ struct SolveOptions {
   // A documented prior over a model's constants (population_prior): partial data then give a
   // posterior with a wide uncertainty, which is never verified.
   std::optional<CalibrationPrior> prior;
+  // What the file makes of raw counts where six constants cannot say it (the matrix of an .agdc):
+  // residual_before_mg is that of it, and `file_constants` its nearest six.
+  std::function<PerAxis<double>(const PerAxis<double>& mean_lsb)> file_g = {};
 };
 
 // Per axis: what the data determine when they do not determine everything.
@@ -75,7 +79,8 @@ struct SolveReport {
   std::size_t points_found = 0;
   std::size_t noisy_points = 0;  // of the used ones: beyond criterion 2 by sensor noise alone
   Coverage coverage;             // as the file's constants have it (the paper's rule)
-  // RMS distance of still blocks from 1 g over directions, every direction equal.
+  // RMS distance of still blocks from 1 g over directions, every direction equal; before: as the file
+  // has them.
   double residual_before_mg = 0;
   std::optional<double> residual_after_mg;
   std::optional<double> residual_rounded_mg;  // with the nine integers

@@ -452,4 +452,25 @@ Result<LogReader> Recording::open_log(Unpacking how) {
   return LogReader(std::move(source));
 }
 
+Result<AgdcCalibration> agdc_calibration(Recording& recording, double rate_hz) {
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
+  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1U << 20U));
+  SIXPOINT_ASSIGN(auto calibration,
+                  parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz)));
+  // 12 bits at 16 LSB/g would be 128 g.
+  constexpr double kLeastScale_lsb_per_g = 16;
+  const auto scale = recording.info().accel_scale_lsb_per_g();
+  if (calibration.already_applied && scale && *scale < kLeastScale_lsb_per_g) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the samples are said to be g times a scale of {} LSB/g", *scale), {},
+                "take the file from where it was made again");
+  }
+  return calibration;
+}
+
+bool holds_raw_counts(Recording& recording, double rate_hz) {
+  const auto calibration = agdc_calibration(recording, rate_hz);
+  return !calibration || !calibration->already_applied;
+}
+
 }  // namespace sixpoint::gt3x

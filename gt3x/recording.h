@@ -24,6 +24,7 @@
 #include "gt3x/container/byte_source.h"
 #include "gt3x/container/delivery.h"
 #include "gt3x/container/entry_rule.h"
+#include "gt3x/forms/agdc.h"
 #include "gt3x/forms/info.h"
 #include "gt3x/log/log_reader.h"
 
@@ -102,5 +103,18 @@ class Recording {
   explicit Recording(std::shared_ptr<Archive> archive);
   std::shared_ptr<Archive> archive_;
 };
+
+// What calibration.json says of the samples of an .agdc. bad_data where there is none, where it is
+// none (parse_agdc_calibration), and where it says that they are g times the file's scale and
+// info.txt holds no such scale (1, as of raw counts).
+Result<AgdcCalibration> agdc_calibration(Recording& recording, double rate_hz);
+
+// Whether ACTIVITY3 records hold raw counts:
+//
+// | calibration.json                              | raw counts                   |
+// |-----------------------------------------------|------------------------------|
+// | "isCalibrated", and agdc_calibration() has it | no: g times the file's scale |
+// | any other, or none                            | yes                          |
+bool holds_raw_counts(Recording& recording, double rate_hz);
 
 }  // namespace sixpoint::gt3x

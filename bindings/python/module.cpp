@@ -20,7 +20,6 @@
 #include "repair/batch/answers.h"
 #include "repair/batch/requests.h"
 #include "repair/rescale/constants_finder.h"
-#include "repair/rescale/gate.h"
 #include "repair/triage/inspection.h"
 #include "repair/triage/survey.h"
 
@@ -109,9 +108,6 @@ py::dict solve(const std::string& path, const std::string& method,
     const auto start = posix_env().clock.elapsed();
     SIXPOINT_ASSIGN(auto solved, repair::solve_survey(path, found, options));
     solved.seconds = std::chrono::duration<double>(posix_env().clock.elapsed() - start).count();
-    if (std::string why = repair::why_not_lent(found); !why.empty()) {
-      solved.notes.push_back(std::move(why));
-    }
     return solved;
   });
   Json json;

@@ -151,7 +151,8 @@ char* sixpoint_reading_open(const char* path, int fill, sixpoint_stop stop,
     options.fill = fill != 0;
     options.fill_zeros = true;
     auto stream = gt3x::SampleStream::open(*recording, options);
-    if (stream && recording->has_entry("calibration.json")) {
+    if (stream && recording->has_entry("calibration.json") &&
+        gt3x::holds_raw_counts(*recording, static_cast<double>(stream->rate_hz()))) {
       return error_for_c({ErrorCode::bad_data, "this is an .agdc file of raw counts", path,
                           "export it as a CSV by sixpoint export"});
     }

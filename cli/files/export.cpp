@@ -132,6 +132,11 @@ Result<Done> export_imu(gt3x::Recording& recording, const gt3x::TextSink& sink) 
     done.warnings.push_back(fmt::format("{} records of the sensor cannot be read and were left out",
                                         tally.unreadable_records));
   }
+  if (tally.other_columns > 0) {
+    done.warnings.push_back(
+        fmt::format("{} seconds of the sensor have other columns than the first and were left out",
+                    tally.other_columns));
+  }
   return done;
 }
 

@@ -235,6 +235,9 @@ Status run_impact(const ImpactCommandOptions& options, Context& context) {
     return run_recording(options, impact, outputs, context);
   }
   if (folders != static_cast<std::ptrdiff_t>(options.paths.size())) {
+    for (const std::string& path : options.paths) {
+      SIXPOINT_CHECK(context.env.files.info(path));  // what is not there is neither
+    }
     return fail(ErrorCode::usage, "one of the two is a folder, the other is not", options.paths[0],
                 "give two recordings, two folders, or an archive's plan");
   }

@@ -108,13 +108,7 @@ Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& op
   SIXPOINT_ASSIGN(outcome.report, repair::solve_survey(path, survey, solve));
   outcome.report.seconds =
       std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
-  if (std::string why = repair::why_not_lent(survey); !why.empty()) {
-    outcome.is_lent = false;
-    outcome.report.notes.push_back(std::move(why));
-  }
-  if (std::string why = repair::why_legacy_repairs_none(survey.facts); !why.empty()) {
-    outcome.report.notes.push_back(std::move(why));
-  }
+  outcome.is_lent = repair::why_not_lent(survey).empty();
   if (const Status kept = keep(path, options, survey, outcome, context, outputs); !kept) {
     outcome.not_kept = kept.error();
   }

@@ -43,6 +43,47 @@ Result<double> number_at(const Json& json, const std::string& key) {
   return found->get<double>();
 }
 
+// Offset, matrix and the six-point form of one rate.
+Status read_coefficients(const Json& json, int rate_hz, AgdcCalibration& calibration) {
+  const auto value = [&](std::string_view name) {
+    return number_at(json, fmt::format("{}_{}", name, rate_hz));
+  };
+  constexpr std::string_view kAxis = "XYZ";
+  StoredConstants constants;
+  bool six_point = true;
+  for (std::size_t row = 0; row < kAxes; ++row) {
+    SIXPOINT_ASSIGN(calibration.offset_lsb[row], value(fmt::format("offset{}", kAxis[row])));
+    for (std::size_t column = row; column < kAxes; ++column) {
+      SIXPOINT_ASSIGN(const double stored,
+                      value(fmt::format("sensitivity{}{}", kAxis[row], kAxis[column])));
+      // Stored in hundredths of LSB per g; off the diagonal as the distance of the reciprocal from
+      // that of 250 LSB/g (as the vendor's public reader decodes it).
+      const double lsb_per_g = stored * 0.01 + (row == column ? 0 : 250);
+      if (lsb_per_g == 0) {
+        return not_a_calibration("the calibration holds a sensitivity of 0");
+      }
+      const double g_per_lsb = 1 / lsb_per_g - (row == column ? 0 : 1.0 / 250);
+      calibration.sensitivity_g_per_lsb[row][column] = g_per_lsb;
+      calibration.sensitivity_g_per_lsb[column][row] = g_per_lsb;
+    }
+    const std::array<std::pair<const char*, PerAxis<int>*>, 3> nine = {{
+        {"positiveZeroGOffset", &constants.positive_lsb},
+        {"negativeZeroGOffset", &constants.negative_lsb},
+        {"zeroGOffset", &constants.zero_lsb},
+    }};
+    for (const auto& [name, axes] : nine) {
+      const auto stored = value(fmt::format("{}{}", name, kAxis[row]));
+      six_point =
+          six_point && stored && *stored >= kStoredConstantMin && *stored <= kStoredConstantMax;
+      (*axes)[row] = six_point ? static_cast<int>(*stored) : 0;
+    }
+  }
+  if (six_point) {
+    calibration.constants = constants;
+  }
+  return {};
+}
+
 double on_line(double adc, double low_adc, double high_adc, double low, double high) {
   return low + (adc - low_adc) * (high - low) / (high_adc - low_adc);
 }
@@ -113,9 +154,6 @@ PerAxis<double> AgdcCalibration::apply_to_mean(const PerAxis<double>& mean_lsb) 
 
 Result<AgdcCalibration> parse_agdc_calibration(std::string_view text, int rate_hz) {
   SIXPOINT_ASSIGN(const Json json, parse_object(text));
-  const auto value = [&](std::string_view name) {
-    return number_at(json, fmt::format("{}_{}", name, rate_hz));
-  };
   AgdcCalibration calibration;
   calibration.already_applied = json.contains("isCalibrated") && json["isCalibrated"] == true;
   calibration.method =
@@ -129,38 +167,9 @@ Result<AgdcCalibration> parse_agdc_calibration(std::string_view text, int rate_h
                             json.value("calibrationMethod", Json(nullptr)).dump()),
                 {}, "export the raw counts with --raw");
   }
-  constexpr std::string_view kAxis = "XYZ";
-  StoredConstants constants;
-  bool six_point = true;
-  for (std::size_t row = 0; row < kAxes; ++row) {
-    SIXPOINT_ASSIGN(calibration.offset_lsb[row], value(fmt::format("offset{}", kAxis[row])));
-    for (std::size_t column = row; column < kAxes; ++column) {
-      SIXPOINT_ASSIGN(const double stored,
-                      value(fmt::format("sensitivity{}{}", kAxis[row], kAxis[column])));
-      // Stored in hundredths of LSB per g; off the diagonal as the distance of the reciprocal from
-      // that of 250 LSB/g (as the vendor's public reader decodes it).
-      const double lsb_per_g = stored * 0.01 + (row == column ? 0 : 250);
-      if (lsb_per_g == 0) {
-        return not_a_calibration("the calibration holds a sensitivity of 0");
-      }
-      const double g_per_lsb = 1 / lsb_per_g - (row == column ? 0 : 1.0 / 250);
-      calibration.sensitivity_g_per_lsb[row][column] = g_per_lsb;
-      calibration.sensitivity_g_per_lsb[column][row] = g_per_lsb;
-    }
-    const std::array<std::pair<const char*, PerAxis<int>*>, 3> nine = {{
-        {"positiveZeroGOffset", &constants.positive_lsb},
-        {"negativeZeroGOffset", &constants.negative_lsb},
-        {"zeroGOffset", &constants.zero_lsb},
-    }};
-    for (const auto& [name, axes] : nine) {
-      const auto stored = value(fmt::format("{}{}", name, kAxis[row]));
-      six_point =
-          six_point && stored && *stored >= kStoredConstantMin && *stored <= kStoredConstantMax;
-      (*axes)[row] = six_point ? static_cast<int>(*stored) : 0;
-    }
-  }
-  if (six_point) {
-    calibration.constants = constants;
+  const Status coefficients = read_coefficients(json, rate_hz, calibration);
+  if (!coefficients && !calibration.already_applied) {
+    return fail(coefficients.error());
   }
   return calibration;
 }

@@ -46,8 +46,10 @@ struct TemperatureCalibration {
 Result<TemperatureCalibration> parse_temperature_calibration(std::string_view json);
 
 struct AgdcCalibration {
-  bool already_applied = false;  // "isCalibrated": the samples are in g times the file's scale
-  int method = 0;                // 2: the matrix holds
+  // "isCalibrated": the samples are in g times the file's scale. The file may then say nothing of what
+  // stands below.
+  bool already_applied = false;
+  int method = 0;  // 2: the matrix holds
   PerAxis<double> offset_lsb{};
   // g per LSB, symmetric: g = sensitivity * (raw - offset).
   PerAxis<PerAxis<double>> sensitivity_g_per_lsb{};
@@ -56,9 +58,9 @@ struct AgdcCalibration {
   PerAxis<double> apply(const Counts& raw_lsb) const;
   PerAxis<double> apply_to_mean(const PerAxis<double>& mean_lsb) const;  // of raw counts
 };
-// For one of the rates that the file knows (32, 64, 128, 256 Hz); bad_data otherwise, for what is
-// no such JSON, and for raw counts of a method other than 2: nothing public says how those become
-// g.
+// For one of the rates that the file knows (32, 64, 128, 256 Hz), or any where it was applied already;
+// bad_data otherwise, for what is no such JSON, and for raw counts of a method other than 2: nothing
+// public says how those become g.
 Result<AgdcCalibration> parse_agdc_calibration(std::string_view json, int rate_hz);
 
 }  // namespace sixpoint::gt3x

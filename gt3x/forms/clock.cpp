@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/bytes.h"
-#include "base/time.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -147,7 +146,7 @@ Clock which_clock(const ClockEvidence& evidence) {
     return local("there is a METADATA record LocalTimeLog, and it does not say that UTC was used");
   }
   if (evidence.raw_counts) {
-    return utc("the recording holds raw counts, as CentrePoint writes them, which uses UTC");
+    return utc("the recording is an .agdc, which CentrePoint writes, and it uses UTC");
   }
   if (evidence.old_form) {
     return local("units of the old form have the clock of the computer that set them");
@@ -160,9 +159,12 @@ Clock which_clock(const ClockEvidence& evidence) {
 }
 
 std::string clock_time(const Clock& clock, std::int64_t unix_s) {
+  return clock_time(clock, from_unix_seconds(unix_s));
+}
+
+std::string clock_time(const Clock& clock, UtcTime time) {
   const bool shifted = clock.kind == ClockKind::utc && clock.offset_minutes;
-  std::string text = to_iso8601(
-      from_unix_seconds(unix_s + (shifted ? std::int64_t{60} * *clock.offset_minutes : 0)));
+  std::string text = to_iso8601(time + std::chrono::minutes(shifted ? *clock.offset_minutes : 0));
   if (clock.kind == ClockKind::utc && !clock.offset_minutes) {
     return text;
   }

@@ -36,6 +36,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/time.h"
 #include "gt3x/forms/info.h"
 
 namespace sixpoint::gt3x {
@@ -70,6 +71,7 @@ Clock which_clock(const ClockEvidence& evidence);
 // ISO 8601 in local time with its offset where that is known, as UTC with a Z where that is all
 // that is known, else as the file has it, without a zone.
 std::string clock_time(const Clock& clock, std::int64_t unix_s);
+std::string clock_time(const Clock& clock, UtcTime time);  // the same, with a fraction
 
 // "-05:00:00" -> -300; nothing for what is no offset (beyond 14 hours, or no such form).
 std::optional<int> parse_offset(std::string_view text);

@@ -47,6 +47,12 @@ Result<SensorColumn> parse_column(std::span<const std::uint8_t> bytes) {
   return column;
 }
 
+bool is_temperature(std::string_view label) {
+  constexpr std::string_view kLabel = "temperature";
+  return std::ranges::equal(
+      label, kLabel, [](char c, char small) { return c == small || c == small - 'a' + 'A'; });
+}
+
 double value_of(const SensorColumn& column, std::span<const std::uint8_t> sample) {
   std::uint32_t stored = 0;
   for (std::size_t i = 0; i < column.bytes; ++i) {
@@ -62,7 +68,7 @@ double value_of(const SensorColumn& column, std::span<const std::uint8_t> sample
   if (column.scale != 0) {
     value /= column.scale;
   }
-  return column.label == "Temperature" ? value + kZeroOfTemperature_c : value;
+  return is_temperature(column.label) ? value + kZeroOfTemperature_c : value;
 }
 
 }  // namespace
@@ -98,9 +104,17 @@ Result<SensorSchema> parse_sensor_schema(std::span<const std::uint8_t> payload) 
   return schema;
 }
 
+Result<std::uint16_t> schema_of_sensor_data(std::span<const std::uint8_t> payload) {
+  if (payload.size() < kDataHeader) {
+    return bad_record("a SENSOR_DATA record is cut short");
+  }
+  return two_bytes(payload);
+}
+
 Result<std::vector<std::vector<double>>> parse_sensor_data(const SensorSchema& schema,
                                                            std::span<const std::uint8_t> payload) {
-  if (payload.size() < kDataHeader || two_bytes(payload) != schema.id) {
+  SIXPOINT_ASSIGN(const std::uint16_t id, schema_of_sensor_data(payload));
+  if (id != schema.id) {
     return bad_record("a SENSOR_DATA record of another schema");
   }
   const auto bytes = payload.subspan(kDataHeader);

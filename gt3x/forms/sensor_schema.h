@@ -28,8 +28,9 @@ struct SensorColumn {
   bool is_signed = false;
   std::size_t first_byte = 0;  // in the sample
   std::size_t bytes = 0;       // 1, 2 or 4
-  // value = stored / scale, or as stored where it is 0. A column "Temperature" is 21 C more, as the
-  // sensor's datasheet has it (InvenSense MPU-9250, register map, TEMP_OUT).
+  // value = stored / scale, or as stored where it is 0. A column "Temperature", in capitals or small
+  // letters, is 21 C more, as the sensor's datasheet has it (InvenSense MPU-9250, register map,
+  // TEMP_OUT).
   double scale = 0;
 };
 
@@ -44,6 +45,9 @@ struct SensorSchema {
 // bad_data for a payload of another length than its columns need, for more than 64 of them, and for
 // a column that is no whole number of bytes.
 Result<SensorSchema> parse_sensor_schema(std::span<const std::uint8_t> payload);
+
+// The number of the schema that a SENSOR_DATA record's payload names; bad_data where it is cut short.
+Result<std::uint16_t> schema_of_sensor_data(std::span<const std::uint8_t> payload);
 
 // One vector per sample, its values in the order of labels(). bad_data for another schema's number
 // and for a payload that is no whole number of samples.

@@ -1,9 +1,11 @@
 #include "gt3x/forms/small_records.h"
 
+#include <algorithm>
 #include <charconv>
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/model.h"
 #include "gt3x/log/record.h"
 
 namespace sixpoint::gt3x {
@@ -13,6 +15,7 @@ using Row = std::vector<std::string>;
 using Rows = std::vector<Row>;
 using Payload = std::span<const std::uint8_t>;
 
+constexpr int kNoReading = 0xFFFF;  // of light
 constexpr std::size_t kBeaconSize = 15;
 constexpr std::size_t kSerialSize = 13;
 constexpr std::size_t kBeatSize = 5;
@@ -136,7 +139,6 @@ Result<std::vector<std::vector<std::string>>> small_record_rows(
       return Rows{{std::to_string(payload[0])}};
     case RecordType::lux: {
       SIXPOINT_CHECK(is_long(payload.size() == 2));
-      constexpr int kNoReading = 0xFFFF;
       const int lux = two_bytes(payload, 0);
       return Rows{{lux == kNoReading ? std::string() : std::to_string(lux)}};
     }
@@ -159,6 +161,19 @@ Result<std::vector<std::vector<std::string>>> small_record_rows(
     default:
       return Rows{{to_hex(payload)}};
   }
+}
+
+std::optional<double> old_lux(std::string_view serial, int reading) {
+  constexpr int kDark = 20;
+  const std::string_view model = model_of(serial);
+  const bool dark = reading < kDark || reading == kNoReading;
+  if (model == "GT3X+") {
+    return dark ? 0 : std::min(1.25 * reading, 2500.0);
+  }
+  if (model == "ActiSleep+") {
+    return dark ? 0 : std::min(3.25 * reading, 6000.0);
+  }
+  return std::nullopt;
 }
 
 }  // namespace sixpoint::gt3x

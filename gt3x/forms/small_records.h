@@ -13,7 +13,8 @@
 // | BATTERY        | one           | battery_v                                                  |
 // | EVENT          | one           | code, payload                                              |
 // | HEART_RATE_BPM | one           | heart_rate_bpm                                             |
-// | LUX            | one           | lux (as stored; empty for 65535, which is no reading)      |
+// | LUX            | one           | lux (as stored; empty for 65535, which is no reading); of  |
+// |                |               | lux.bin (old form): old_lux(), below                       |
 // | METADATA       | one           | text                                                       |
 // | TAG            | one a beacon  | beacon, transmit_power_db, received_db                     |
 // | HEART_RATE_ANT | one a beat    | beat, previous_s, current_s                                |
@@ -46,5 +47,14 @@ std::vector<std::string> small_record_columns(std::uint8_t type);
 Result<std::vector<std::vector<std::string>>> small_record_rows(
     std::uint8_t type, std::span<const std::uint8_t> payload,
     const std::optional<TemperatureCalibration>& temperature);
+
+// A reading of lux.bin (old form) in lux, by the vendor's public description of that file:
+//
+// | the unit                      | below 20, and 65535 | any other reading                    |
+// |-------------------------------|---------------------|--------------------------------------|
+// | GT3X+ (NEO)                   | 0                   | 1.25 times the reading, 2500 at most |
+// | ActiSleep+ (MRA)              | 0                   | 3.25 times the reading, 6000 at most |
+// | any other                     | not known           | not known: it is not public          |
+std::optional<double> old_lux(std::string_view serial, int reading);
 
 }  // namespace sixpoint::gt3x

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -65,12 +67,46 @@ std::string second_lines(std::uint32_t unix_time, const std::vector<std::vector<
   return text;
 }
 
+// The schemas of a recording, by number. The columns of the CSV are those of the first.
+class Schemas {
+ public:
+  // False for a payload that cannot be read.
+  bool take(std::span<const std::uint8_t> payload) {
+    auto parsed = parse_sensor_schema(payload);
+    constexpr std::size_t kMost = 64;  // real units write one
+    if (!parsed || (by_id_.size() == kMost && !by_id_.contains(parsed->id))) {
+      return false;
+    }
+    if (by_id_.empty()) {
+      labels_ = parsed->labels();
+    }
+    auto& known = by_id_[parsed->id];
+    known.reset();
+    if (parsed->labels() == labels_) {
+      known = *std::move(parsed);
+    }
+    return true;
+  }
+
+  bool empty() const { return by_id_.empty(); }
+
+  // Null where no schema has this number; nothing in it where that one has other columns.
+  const std::optional<SensorSchema>* find(std::uint16_t id) const {
+    const auto found = by_id_.find(id);
+    return found == by_id_.end() ? nullptr : &found->second;
+  }
+
+ private:
+  std::vector<std::string> labels_;
+  std::map<std::uint16_t, std::optional<SensorSchema>> by_id_;
+};
+
 }  // namespace
 
 Result<ImuCsvTally> write_imu_csv(Recording& recording, const TextSink& sink) {
   SIXPOINT_ASSIGN(LogReader log, recording.open_log());
   ImuCsvTally tally;
-  std::optional<SensorSchema> schema;
+  Schemas schemas;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item) {
@@ -86,23 +122,23 @@ Result<ImuCsvTally> write_imu_csv(Recording& recording, const TextSink& sink) {
       continue;
     }
     if (record.is(RecordType::sensor_schema)) {
-      auto parsed = parse_sensor_schema(record.payload);
-      // The columns of the file are those of its first schema.
-      if (parsed && (!schema || parsed->labels() == schema->labels())) {
-        schema = *std::move(parsed);
-      } else {
-        ++tally.unreadable_records;
-      }
+      tally.unreadable_records += schemas.take(record.payload) ? 0 : 1;
       continue;
     }
-    const auto samples =
-        schema ? parse_sensor_data(*schema, record.payload) : fail(ErrorCode::bad_data, "");
+    const auto id = schema_of_sensor_data(record.payload);
+    const auto* schema = id ? schemas.find(*id) : nullptr;
+    if (schema != nullptr && !*schema) {
+      ++tally.other_columns;
+      continue;
+    }
+    const auto samples = schema != nullptr ? parse_sensor_data(**schema, record.payload)
+                                           : fail(ErrorCode::bad_data, "");
     if (!samples || samples->empty()) {
       ++tally.unreadable_records;
       continue;
     }
     if (tally.seconds == 0) {
-      SIXPOINT_CHECK(sink(csv_header(recording.info(), record.unix_time, *schema)));
+      SIXPOINT_CHECK(sink(csv_header(recording.info(), record.unix_time, **schema)));
     }
     ++tally.seconds;
     tally.samples += samples->size();
@@ -111,8 +147,9 @@ Result<ImuCsvTally> write_imu_csv(Recording& recording, const TextSink& sink) {
   }
   if (tally.seconds == 0) {
     return fail(ErrorCode::bad_data,
-                schema ? "the recording holds no data of an inertial sensor"
-                       : "the recording holds no description of an inertial sensor (SENSOR_SCHEMA)",
+                schemas.empty()
+                    ? "the recording holds no description of an inertial sensor (SENSOR_SCHEMA)"
+                    : "the recording holds no data of an inertial sensor",
                 recording.path(), "only a GT9X Link with the IMU switched on records it");
   }
   return tally;

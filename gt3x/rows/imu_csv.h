@@ -28,6 +28,7 @@ struct ImuCsvTally {
   std::uint64_t samples = 0;             // of the sensor, before interpolation
   std::uint64_t resampled_seconds = 0;   // those that did not hold 100 samples
   std::uint64_t unreadable_records = 0;  // wrong checksum, or not as their schema says
+  std::uint64_t other_columns = 0;       // records of a schema with other columns than the first
 };
 
 // bad_data for a recording of the old form, and for one without a schema or without data.

@@ -2,16 +2,31 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/clock.h"
 #include "gt3x/forms/eeprom.h"
 #include "gt3x/forms/small_records.h"
+#include "gt3x/sample_reader.h"
 
 namespace sixpoint::gt3x {
 namespace {
 
+// As it is known at the first sample (of the old form by the header), where `export --time` asks for
+// it too.
+Result<bool> is_by_utc(Recording& recording) {
+  SampleReader reader(recording);
+  if (recording.has_log()) {
+    SIXPOINT_CHECK(reader.next());
+  }
+  return reader.clock().kind == ClockKind::utc;
+}
+
 // The rows of one record as lines.
-std::string lines_of(std::int64_t unix_s, const std::vector<std::vector<std::string>>& rows) {
+std::string lines_of(std::int64_t unix_s, bool utc,
+                     const std::vector<std::vector<std::string>>& rows) {
   std::string time = to_iso8601(from_unix_seconds(unix_s));
-  time.pop_back();  // Z: the clock is the recording's own
+  if (!utc) {
+    time.pop_back();  // Z
+  }
   std::string text;
   for (const auto& row : rows) {
     text += fmt::format("{},{}", time, unix_s);
@@ -34,12 +49,14 @@ Result<std::optional<TemperatureCalibration>> temperature_calibration(Recording&
   return calibration;
 }
 
-Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink) {
+Result<RecordsCsvTally> write_old_lux(Recording& recording, bool utc, const TextSink& sink) {
   const auto start = recording.info().start();
   if (!start) {
     return fail(ErrorCode::bad_data, "info.txt names no start", recording.path(),
                 "download the recording from the unit again");
   }
+  const std::string serial = recording.info().serial();
+  SIXPOINT_CHECK(sink(old_lux(serial, 0) ? "time,unix_s,lux\n" : "time,unix_s,lux_raw\n"));
   SIXPOINT_ASSIGN(const auto source, recording.open_entry("lux.bin"));
   RecordsCsvTally tally;
   Bytes bytes(std::size_t{64} * 1024);
@@ -50,10 +67,10 @@ Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink
     std::string text;
     std::size_t used = 0;
     for (; used + 2 <= held; used += 2) {
-      SIXPOINT_ASSIGN(const auto rows,
-                      small_record_rows(static_cast<std::uint8_t>(RecordType::lux),
-                                        std::span(bytes).subspan(used, 2), std::nullopt));
-      text += lines_of(to_unix_seconds(*start) + static_cast<std::int64_t>(tally.records), rows);
+      const int reading = bytes[used] | (bytes[used + 1] << 8);
+      const std::string value = fmt::format("{}", old_lux(serial, reading).value_or(reading));
+      text += lines_of(to_unix_seconds(*start) + static_cast<std::int64_t>(tally.records), utc,
+                       {{value}});
       ++tally.records;
     }
     SIXPOINT_CHECK(sink(text));
@@ -68,13 +85,13 @@ Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink
   }
 }
 
-Result<RecordsCsvTally> write_old_battery(Recording& recording, const TextSink& sink) {
+Result<RecordsCsvTally> write_old_battery(Recording& recording, bool utc, const TextSink& sink) {
   SIXPOINT_ASSIGN(const auto source, recording.open_entry("battery.bin"));
   SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1U << 24));
   RecordsCsvTally tally;
   for (const OldBatteryReading& reading : parse_old_battery(bytes)) {
-    SIXPOINT_CHECK(
-        sink(lines_of(to_unix_seconds(reading.time), {{fmt::format("{}", reading.battery_v)}})));
+    SIXPOINT_CHECK(sink(
+        lines_of(to_unix_seconds(reading.time), utc, {{fmt::format("{}", reading.battery_v)}})));
     ++tally.records;
   }
   tally.unreadable_records = bytes.size() / kOldBatteryEntry - tally.records;
@@ -85,6 +102,7 @@ Result<RecordsCsvTally> write_old_battery(Recording& recording, const TextSink& 
 
 Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t type,
                                           const TextSink& sink) {
+  SIXPOINT_ASSIGN(const bool utc, is_by_utc(recording));
   std::string header = "time,unix_s";
   for (const std::string& column : small_record_columns(type)) {
     header += "," + column;
@@ -92,13 +110,13 @@ Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t typ
   if (!recording.has_log() && type == static_cast<std::uint8_t>(RecordType::battery) &&
       recording.has_entry("battery.bin")) {
     SIXPOINT_CHECK(sink(header + "\n"));
-    return write_old_battery(recording, sink);
+    return write_old_battery(recording, utc, sink);
   }
-  const bool old_lux = !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
-                       recording.has_entry("lux.bin");
-  if (old_lux) {
-    SIXPOINT_CHECK(sink(header + "\n"));
-    return write_old_lux(recording, sink);
+  const bool has_old_lux = !recording.has_log() &&
+                           type == static_cast<std::uint8_t>(RecordType::lux) &&
+                           recording.has_entry("lux.bin");
+  if (has_old_lux) {
+    return write_old_lux(recording, utc, sink);
   }
   SIXPOINT_ASSIGN(LogReader log, recording.open_log());
   SIXPOINT_ASSIGN(const auto temperature, temperature_calibration(recording));
@@ -120,7 +138,7 @@ Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t typ
       continue;
     }
     ++tally.records;
-    SIXPOINT_CHECK(sink(lines_of(record.unix_time, *rows)));
+    SIXPOINT_CHECK(sink(lines_of(record.unix_time, utc, *rows)));
   }
 }
 

@@ -8,10 +8,12 @@
 //   };
 //   SIXPOINT_ASSIGN(const auto tally, write_records_csv(recording, 2, sink));  // BATTERY
 //
-// The first line names the columns: time (ISO 8601, by the recording's own clock), unix_s, and
+// The first line names the columns: time (ISO 8601, by the recording's own clock, with a Z where that
+// is UTC), unix_s, and
 // those of gt3x/forms/small_records.h. Records come in the order of the file. Of the old form (no
 // records) LUX is read from lux.bin, one value a second from the start on, and BATTERY from
-// battery.bin.
+// battery.bin. Readings of lux.bin are lux by old_lux(); where that is not known, they stand as they
+// are under `lux_raw`.
 #pragma once
 
 #include <cstdint>

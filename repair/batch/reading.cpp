@@ -5,8 +5,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "base/bytes.h"
-#include "gt3x/container/byte_source.h"
 #include "gt3x/forms/agdc.h"
 #include "gt3x/log/log_reader.h"
 #include "repair/triage/survey.h"
@@ -23,20 +21,6 @@ std::uint64_t half_of_memory() {
 
 namespace {
 
-// What stands beside the raw counts of an .agdc; nothing where it cannot be read.
-std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double rate_hz) {
-  const auto source = recording.open_entry("calibration.json");
-  if (!source) {
-    return std::nullopt;
-  }
-  const auto bytes = gt3x::read_all(**source, 1U << 20U);
-  if (!bytes) {
-    return std::nullopt;
-  }
-  const auto parsed = gt3x::parse_agdc_calibration(as_text(*bytes), static_cast<int>(rate_hz));
-  return parsed ? parsed->constants : std::nullopt;
-}
-
 Status take_constants(Inspection& found, gt3x::Recording& recording,
                       const gt3x::SampleReader& reader) {
   if (!recording.has_log()) {
@@ -51,8 +35,11 @@ Status take_constants(Inspection& found, gt3x::Recording& recording,
     add_facts(*first.record, found.facts);
   }
   if (found.form == "agdc") {
-    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
-    found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
+    const auto agdc = gt3x::agdc_calibration(recording, found.rate_hz.value_or(0));
+    found.constants = agdc ? agdc->constants : std::nullopt;
+    if (!agdc || !agdc->already_applied) {
+      found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
+    }
     return {};
   }
   found.constants = first.known_constants();

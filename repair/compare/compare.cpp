@@ -53,6 +53,7 @@ Result<PairComparison> compare(const Trace& a, const Trace& b, const CompareOpti
   PairComparison result;
   result.a = a.name();
   result.b = b.name();
+  result.clock = a.clock();
   const Line line = align(a, b, options, result);
   result.lag_s = line.lag_s;
   result.lag_at_s = line.middle_s;
@@ -112,8 +113,8 @@ nlohmann::ordered_json PairComparison::to_json() const {
   return {{"a", a},
           {"b", b},
           {"lag_s", lag_s},
-          {"lag_at",
-           to_iso8601(UtcTime(std::chrono::nanoseconds(std::llround(lag_at_s * 1e3) * 1'000'000)))},
+          {"lag_at", gt3x::clock_time(
+                         clock, UtcTime(std::chrono::milliseconds(std::llround(lag_at_s * 1e3))))},
           {"lag_uncertainty_s", lag_uncertainty_s},
           {"drift_ppm", drift_ppm},
           {"aligned", aligned},

@@ -72,6 +72,7 @@ struct PairComparison {
   // middle of the minutes used); away from there the lag changes by drift_ppm.
   double lag_s = 0;
   double lag_at_s = 0;
+  gt3x::Clock clock;  // of A
   double drift_ppm = 0;
   // The error of lag_s is smaller in 99 of 100 cases; where the motion is periodic, the distance of
   // the farthest lag that fits nearly as well (a remark says so). 0 only where it is not aligned.

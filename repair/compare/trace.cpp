@@ -20,6 +20,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(trace.rate_hz_, gt3x::usable_sample_rate_hz(recording.info(), path));
   const auto rate = static_cast<std::uint64_t>(std::lround(trace.rate_hz_));
   std::optional<std::uint32_t> start;
+  const bool raw_counts = gt3x::holds_raw_counts(recording, trace.rate_hz_);  // of ACTIVITY3
   gt3x::SampleReader reader(recording);
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
@@ -29,7 +30,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     if (item->kind != gt3x::SampleItem::Kind::recorded) {
       continue;
     }
-    if (item->type == gt3x::RecordType::activity3) {
+    if (item->type == gt3x::RecordType::activity3 && raw_counts) {
       return fail(ErrorCode::bad_data, "the recording holds raw counts, not g", path,
                   "compare .gt3x recordings");
     }
@@ -63,6 +64,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
       trace.magnitude_g_[first + i] = static_cast<float>(std::sqrt(square) / *scale);
     }
   }
+  trace.clock_ = reader.clock();
   if (trace.magnitude_g_.empty()) {
     return fail(ErrorCode::bad_data, "the recording holds no samples", path,
                 "check that the unit was started; download the recording again");

@@ -15,6 +15,7 @@
 
 #include "base/env.h"
 #include "base/result.h"
+#include "gt3x/forms/clock.h"
 
 namespace sixpoint::repair {
 
@@ -33,7 +34,8 @@ class Trace {
 
   const std::string& name() const { return name_; }
   double rate_hz() const { return rate_hz_; }
-  double start_s() const { return start_s_; }  // Unix time of step 0
+  double start_s() const { return start_s_; }          // Unix time of step 0
+  const gt3x::Clock& clock() const { return clock_; }  // of these times; not known by default
   double end_s() const { return start_s_ + static_cast<double>(magnitude_g_.size()) / rate_hz_; }
   std::size_t size() const { return magnitude_g_.size(); }
   float magnitude_g(std::size_t i) const { return magnitude_g_[i]; }  // NaN where missing
@@ -43,6 +45,7 @@ class Trace {
  private:
   std::string name_;
   double start_s_ = 0;
+  gt3x::Clock clock_;
   double rate_hz_ = 1;
   std::vector<float> magnitude_g_;
 };

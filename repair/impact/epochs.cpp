@@ -123,6 +123,7 @@ Result<EpochSeries> epochs_of(gt3x::Recording& recording, const EpochOptions& op
   const auto rate = static_cast<std::size_t>(std::lround(series.rate_hz));
   std::optional<Run> run;
   std::vector<Sample> samples;
+  const bool raw_counts = gt3x::holds_raw_counts(recording, series.rate_hz);  // of ACTIVITY3
   gt3x::SampleReader reader(recording);
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
@@ -133,7 +134,7 @@ Result<EpochSeries> epochs_of(gt3x::Recording& recording, const EpochOptions& op
         (run && item->unix_time < run->next_second())) {
       continue;
     }
-    if (item->type == gt3x::RecordType::activity3) {
+    if (item->type == gt3x::RecordType::activity3 && raw_counts) {
       return bad("the recording holds raw counts, not g", path, "give .gt3x recordings");
     }
     const auto scale = gt3x::accel_scale_lsb_per_g(recording.info(), item->parameters);

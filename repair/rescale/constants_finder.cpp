@@ -40,15 +40,21 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
                 path, "use a recording whose info.txt has the line 'Acceleration Scale'");
   }
   calib::Calibration file_constants;
-  if (survey.raw_counts && survey.raw_calibration) {
-    file_constants = *survey.raw_calibration;
+  calib::SolveOptions how = options;
+  if (survey.raw_counts && survey.agdc) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      file_constants.sensitivity_g_per_lsb[a] = survey.agdc->sensitivity_g_per_lsb[a][a];
+      file_constants.zero_lsb[a] = survey.agdc->offset_lsb[a];
+    }
+    how.file_g = [agdc = *survey.agdc](const PerAxis<double>& mean_lsb) {
+      return agdc.apply_to_mean(mean_lsb);
+    };
   } else if (survey.constants_problem.has_value()) {
     return fail(*survey.constants_problem);
   } else {
     SIXPOINT_ASSIGN(file_constants, calib::calibration_from(survey.constants.front()));
   }
-  SIXPOINT_ASSIGN(auto report,
-                  calib::solve_from_still_blocks(survey.blocks, file_constants, options));
+  SIXPOINT_ASSIGN(auto report, calib::solve_from_still_blocks(survey.blocks, file_constants, how));
   report.serial = survey.facts.serial;
   report.filter = filter_in_force(survey.facts);
   report.notes.insert(report.notes.end(), survey.notes.begin(), survey.notes.end());
@@ -61,6 +67,11 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
         "Z)",
         drift.low_c, drift.high_c, drift.zero_mg_per_c[0], drift.zero_mg_per_c[1],
         drift.zero_mg_per_c[2]));
+  }
+  for (std::string why : {why_not_lent(survey), why_legacy_repairs_none(survey.facts)}) {
+    if (!why.empty()) {
+      report.notes.push_back(std::move(why));
+    }
   }
   return report;
 }

@@ -56,7 +56,8 @@ struct ConstantsFinderOptions {
 // The sources that a finder with these options asks, in order.
 std::vector<SourceKind> sources_in_order(const ConstantsFinderOptions& options);
 
-// Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
+// Solves the still blocks of a surveyed recording; serial and filter of the report are filled in, and
+// its notes say all that matters for people: also why the constants are not for other recordings.
 // bad_data where the recording's constants cannot be undone, its scale is not known, or it was
 // repaired already.
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,

@@ -14,13 +14,6 @@
 namespace sixpoint::repair {
 namespace {
 
-// What an .agdc file carries beside its raw counts.
-Result<gt3x::AgdcCalibration> agdc_calibration(gt3x::Recording& recording, double rate_hz) {
-  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
-  SIXPOINT_ASSIGN(const Bytes bytes, gt3x::read_all(*source, 1U << 20U));
-  return gt3x::parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
-}
-
 // Finds still blocks while the samples are read, so that no recording must fit into memory.
 class StillWatch {
  public:
@@ -276,7 +269,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
 
   std::optional<gt3x::AgdcCalibration> agdc;
   if (recording.has_entry("calibration.json")) {
-    auto calibration = agdc_calibration(recording, found.rate_hz.value_or(0));
+    auto calibration = gt3x::agdc_calibration(recording, found.rate_hz.value_or(0));
     if (calibration) {
       agdc = *std::move(calibration);
     } else {

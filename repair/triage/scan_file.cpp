@@ -122,6 +122,10 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
   if (!survey->raw_counts && !survey->accel_scale_known) {
     answer.reasons.push_back(
         "it does not say how many counts are 1 g, so the samples give no evidence");
+  } else if (survey->raw_counts && !survey->agdc) {
+    answer.reasons.push_back(
+        "it holds raw counts and no calibration.json that fits them, so the samples give no "
+        "evidence");
   } else if (survey->magnitude.blocks > 0) {
     answer.evidence_mg = survey->magnitude.p95_mg;
     if (survey->magnitude.p95_mg > kEvidenceLimit_mg) {

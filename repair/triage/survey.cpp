@@ -167,26 +167,6 @@ std::string text_of(gt3x::Recording& recording, const std::string& name) {
   return bytes ? std::string(bytes->begin(), bytes->end()) : std::string();
 }
 
-// What an .agdc file says about its raw counts.
-std::optional<calib::Calibration> raw_calibration_of(gt3x::Recording& recording, double rate_hz) {
-  const auto calibration = gt3x::parse_agdc_calibration(text_of(recording, "calibration.json"),
-                                                        static_cast<int>(rate_hz));
-  if (!calibration || calibration->already_applied) {
-    return std::nullopt;
-  }
-  if (calibration->constants) {
-    if (const auto six_point = calib::calibration_from(*calibration->constants)) {
-      return *six_point;
-    }
-  }
-  calib::Calibration out;
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    out.sensitivity_g_per_lsb[a] = calibration->sensitivity_g_per_lsb[a][a];
-    out.zero_lsb[a] = calibration->offset_lsb[a];
-  }
-  return calib::validate(out) ? std::optional(out) : std::nullopt;
-}
-
 std::optional<double> celsius_of(const gt3x::Record& record,
                                  const gt3x::TemperatureCalibration& thermometer) {
   const auto reading = gt3x::parse_temperature(record.payload);
@@ -206,9 +186,9 @@ void take_scan(StillScan& scan, const std::string& path, Survey& result) {
   result.blocks = scan.finish();
   result.plausibility = scan.plausibility();
   result.still_tally = scan.tally();
-  if (result.raw_calibration) {
+  if (result.raw_counts && result.agdc) {
     for (calib::StillBlock& block : result.blocks) {
-      block.mean_g = result.raw_calibration->to_g(block.mean_lsb);
+      block.mean_g = result.agdc->apply_to_mean(block.mean_lsb);
     }
   }
   if (result.still_tally.thinned > 1) {
@@ -533,15 +513,18 @@ class LogSurvey::Pass {
 
   Status take_raw_samples(const gt3x::Record& record) {
     if (!raw_still_) {
-      result_.raw_counts = true;
-      result_.raw_calibration = raw_calibration_of(recording_, result_.rate_hz);
+      if (auto agdc = gt3x::agdc_calibration(recording_, result_.rate_hz)) {
+        result_.agdc = *std::move(agdc);
+      }
+      result_.raw_counts = !result_.agdc || !result_.agdc->already_applied;
+      const double scale_lsb_per_g = result_.raw_counts ? kUsualScale_lsb_per_g : scale_lsb_per_g_;
       const auto parsed =
           gt3x::parse_temperature_calibration(text_of(recording_, "temperature_calibration.json"));
       thermometer_ = parsed ? std::optional(*parsed) : std::nullopt;
       calib::StillBlockOptions humming = options_;
       humming.noisy_sd_g = kHum_g;
-      SIXPOINT_ASSIGN(raw_still_, make_scan(kUsualScale_lsb_per_g, options_));
-      SIXPOINT_ASSIGN(raw_resting_, make_scan(kUsualScale_lsb_per_g, humming));
+      SIXPOINT_ASSIGN(raw_still_, make_scan(scale_lsb_per_g, options_));
+      SIXPOINT_ASSIGN(raw_resting_, make_scan(scale_lsb_per_g, humming));
     }
     gt3x::unpack_activity3(record.payload, samples_);
     result_.samples += samples_.size();
@@ -574,10 +557,15 @@ class LogSurvey::Pass {
     }
     if (result_.raw_counts) {
       result_.constants_problem = no_constants(
-          result_.raw_calibration
-              ? "the recording holds raw counts, which no constants have been applied to"
-              : "the recording holds raw counts and no calibration.json that fits them",
+          result_.agdc ? "the recording holds raw counts, which no constants have been applied to"
+                       : "the recording holds raw counts and no calibration.json that fits them",
           recording_.path(), "it needs no repair");
+    } else if (result_.agdc) {
+      result_.constants_problem = no_constants(
+          "its samples were calibrated before they were written (calibration.json): what the "
+          "sensor "
+          "counted is not known",
+          recording_.path(), "solve a recording of raw counts of this unit");
     } else if (result_.constants.empty() && !result_.already_repaired) {
       result_.constants_problem = no_constants(
           "the recording holds no complete set of constants (PARAMETERS)", recording_.path(),
@@ -595,7 +583,7 @@ class LogSurvey::Pass {
   bool contradicted_ = false;  // the last record has some of them, and not those in force
   std::uint64_t samples_before_constants_ = 0;
   std::optional<StillScan> still_;
-  std::optional<StillScan> raw_still_;  // of raw counts (.agdc)
+  std::optional<StillScan> raw_still_;  // of ACTIVITY3 (.agdc)
   std::optional<StillScan> raw_resting_;
   std::optional<gt3x::TemperatureCalibration> thermometer_;
   std::vector<gt3x::Counts> samples_;

@@ -20,6 +20,7 @@
 #include "base/env.h"
 #include "base/stored_constants.h"
 #include "calib/still_blocks.h"
+#include "gt3x/forms/agdc.h"
 #include "gt3x/forms/eeprom.h"
 #include "gt3x/forms/info.h"
 #include "gt3x/forms/parameters.h"
@@ -76,11 +77,17 @@ struct Survey {
   //
   // repair/rescale/rescaled_log.h undoes the same ones (promise R22).
   std::vector<StoredConstants> constants;
-  // An .agdc file's samples are raw counts, which nothing has to be undone for and nothing can be
-  // repaired in; this is what its calibration.json makes of them (the six-point form, else offset
-  // and the diagonal of the matrix).
+  // What an .agdc file's samples are, in which nothing can be repaired. The still blocks' mean_g are
+  // what `export` makes of them:
+  //
+  // | calibration.json                | raw_counts | agdc             | mean_g                       |
+  // |---------------------------------|------------|------------------|------------------------------|
+  // | says how counts become g        | true       | says how         | by its offset and its matrix |
+  // | is missing, or does not fit     | true       | none             | by the usual scale: a guess  |
+  // | was applied already             | false      | already_applied  | by the file's scale          |
+  // | (any other form of recording)   | false      | none             | by the file's scale          |
   bool raw_counts = false;
-  std::optional<calib::Calibration> raw_calibration;
+  std::optional<gt3x::AgdcCalibration> agdc;
   // Why they cannot be used (none in the file, positive = negative, or no samples to use them on),
   // where that is so.
   std::optional<Error> constants_problem;

@@ -264,6 +264,42 @@ TEST(RecordingWriter, UnknownSizesMakeReadableEntries) {
   EXPECT_EQ(log_of(memory.files, "f").value(), made_log(3));
 }
 
+// The table of holds_raw_counts(), and what agdc_calibration() says of each row.
+TEST(Recording, WhetherAnAgdcHoldsRawCounts) {
+  std::string raw = R"({"isCalibrated":false,"calibrationMethod":2)";
+  for (const char* key : {"offsetX", "offsetY", "offsetZ", "sensitivityXX", "sensitivityYY",
+                          "sensitivityZZ", "sensitivityXY", "sensitivityXZ", "sensitivityYZ"}) {
+    raw += std::string(",\"") + key + "_32\":25000";
+  }
+  raw += '}';
+  struct Case {
+    const char* calibration;
+    const char* scale;
+    bool fits;
+    bool raw_counts;
+  };
+  for (const Case& one :
+       {Case{R"({"isCalibrated":true})", "256", true, false},
+        Case{R"({"isCalibrated":true})", "16", true, false},
+        Case{R"({"isCalibrated":true})", "1", false, true}, Case{raw.c_str(), "1", true, true},
+        Case{R"({"isCalibrated":false})", "256", false, true}, Case{"no JSON", "256", false, true},
+        Case{nullptr, "256", false, true}}) {
+    MemoryEnv memory;
+    auto out = RecordingWriter::create(memory.files, "a.agdc").value();
+    ASSERT_OK(out.add("log.bin", made_log(1)));
+    const std::string info =
+        std::string("Sample Rate: 32\r\nAcceleration Scale: ") + one.scale + "\r\n";
+    ASSERT_OK(out.add("info.txt", std::string_view(info)));
+    if (one.calibration != nullptr) {
+      ASSERT_OK(out.add("calibration.json", std::string_view(one.calibration)));
+    }
+    ASSERT_OK(out.commit());
+    auto recording = Recording::open(memory.files, "a.agdc").value();
+    EXPECT_EQ(holds_raw_counts(recording, 32), one.raw_counts) << one.scale;
+    EXPECT_EQ(agdc_calibration(recording, 32).has_value(), one.fits) << one.scale;
+  }
+}
+
 // Oracle: the real recording itself; a copy made entry by entry holds the same bytes.
 TEST(Recording, RealFileCopied) {
   SIXPOINT_NEED_SHARED("data/gt9x/TAS1H52220588.gt3x");

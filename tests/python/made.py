@@ -36,11 +36,12 @@ def real(name):
 
 
 @functools.cache
-def simulated(seed=1):
-    """A recording of an affected unit, made by the program: tests/docs/scenario.json."""
+def simulated(seed=1, firmware="1.5.0"):
+    """A recording made by the program: tests/docs/scenario.json, of an affected unit."""
     folder = pathlib.Path(tempfile.mkdtemp(prefix="made", dir=os.environ["HOME"]))
     scenario = json.loads((SOURCE / "tests/docs/scenario.json").read_text())
     scenario["seed"] = seed
+    scenario["unit"]["firmware"] = firmware
     (folder / "s.json").write_text(json.dumps(scenario))
     path = folder / f"day{seed}.gt3x"
     program("simulate", "--scenario", folder / "s.json", "-o", path)

@@ -56,6 +56,12 @@ class SameAnswers(InFolder):
         self.assertLessEqual(fields_of(answer), set(answer.document))
         self.assertEqual(answer.verified, said["verified"])
 
+    def test_solve_has_the_notes_of_the_command(self):
+        legacy = simulated(firmware="1.3.0")
+        notes = sixpoint.solve(legacy).document["notes"]
+        self.assertTrue(any("legacy configuration" in note for note in notes), notes)
+        self.assertEqual(notes, program_json("solve", legacy, expected=(0, 1))["notes"])
+
     def test_solve_by_local_gravity(self):
         for ours, theirs in (
             ({"gravity": 9.81}, ("--gravity", "9.81")),

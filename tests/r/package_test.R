@@ -27,6 +27,11 @@ same_as_export <- function(path) {
 frame <- same_as_export("day1.gt3x")
 stopifnot(nrow(head(frame)) == 6, inherits(head(frame), "activity_df"))
 
+# Of an .agdc, samples that are in g already are read; raw counts are refused.
+same_as_export("in_g.agdc")
+refused <- tryCatch(read_gt3x_sixpoint("raw.agdc"), sixpoint_error = function(e) e)
+stopifnot(refused$code == "bad_data")
+
 # Zeros in place of missing seconds: what is not zero is what was recorded, and times have no hole.
 affected <- file.path(shared, "data/wgt3x-bt-affected/MOS2A45130451.gt3x")
 if (file.exists(affected)) {

@@ -33,7 +33,11 @@ done
 PYTHONPATH=$source_folder/tests/python python3 -c '
 from made import *
 many_gaps(".")
-write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")'
+write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")
+for name, calibrated in (("in_g", "true"), ("raw", "false")):
+    path = write_recording(name + ".agdc", record(27, START, packed(samples_of(0))), INFO)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("calibration.json", "{\"isCalibrated\": %s}" % calibrated)'
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
 for call in scan_16cpan03 read_gt3x_sixpoint; do

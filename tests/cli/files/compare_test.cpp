@@ -63,6 +63,25 @@ TEST(Compare, FindsTheLagOfTheSameMotion) {
   EXPECT_THAT(std::string(page->begin(), page->end()), testing::HasSubstr("<svg"));
 }
 
+// The middle of the lively minutes, by the clock of the first recording: no zone where none is known
+// (before: a Z), the wearer's time and its offset where the clock is UTC and the offset is known.
+TEST(Compare, TimesAreByTheClockOfTheFirstRecording) {
+  Units units;
+  ASSERT_OK(gt3x::tests::put_recording(
+      units.memory.files, "utc.gt3x", moved(0),
+      gt3x::tests::made_info() + "Download Software: CentrePoint\r\nTimeZone: -05:00:00\r\n"));
+  const auto lag_at = [&](const std::string& first) {
+    const auto json =
+        run_command(units.memory.env, {"compare", first, "late.gt3x", "--json"}).json();
+    return json["pairs"][0]["lag_at"].get<std::string>();
+  };
+  const std::string unknown = lag_at("a.gt3x");
+  EXPECT_THAT(unknown, testing::MatchesRegex("2015-04-09T14:[0-9:.]+"));
+  const std::string utc = lag_at("utc.gt3x");
+  EXPECT_THAT(utc, testing::MatchesRegex("2015-04-09T09:[0-9:.]+-05:00"));
+  EXPECT_EQ(utc.substr(13, unknown.size() - 13), unknown.substr(13));
+}
+
 TEST(Compare, ThreeRecordingsAreThreePairs) {
   Units units;
   const auto answer =

@@ -170,6 +170,14 @@ TEST_F(ImpactCommand, WhatIsWrongIsSaid) {
   EXPECT_EQ(run({"in.gt3x", "--epoch", "0"}).exit_code, 64);
   EXPECT_EQ(run({"in.gt3x", "--epoch", "3000"}).exit_code, 65);
   EXPECT_EQ(run({"none.gt3x"}).exit_code, 66);
+  ASSERT_OK(memory_.files.make_folders("folder"));
+  for (const auto& two :
+       std::vector<std::vector<std::string>>{{"none", "folder"}, {"folder", "none"}}) {
+    const auto missing = run(two);
+    EXPECT_EQ(missing.exit_code, 66) << two[0];
+    EXPECT_THAT(missing.people, HasSubstr("none: "));
+  }
+  EXPECT_EQ(run({"in.gt3x", "folder"}).exit_code, 64) << "both are there";
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "calib/constants.h"
 #include "cli/command_fixture.h"
 #include "expect_result.h"
+#include "repair/made_agdc.h"
 #include "repair/made_recording.h"
 #include "shared_data.h"
 
@@ -358,6 +359,20 @@ TEST_F(SolveCommand, TemperatureTermsAreAdmittedByEvidenceOnly) {
   ASSERT_EQ(steady.exit_code, 0) << steady.out;
   EXPECT_TRUE(!steady.json().contains("richer_model") ||
               steady.json()["richer_model"]["zero_lsb_per_c"].is_null());
+}
+
+// Of samples that are in g already there are no raw counts to solve.
+TEST_F(SolveCommand, ACalibratedAgdcIsExportedAndNotSolved) {
+  const std::string path = folder_ / "calibrated.agdc";
+  tests::MadeAgdc made;
+  made.calibrated = true;
+  made.coefficients = false;
+  ASSERT_OK(made.write(posix_env().files, path));
+  const auto answer = run({"solve", path});
+  EXPECT_EQ(answer.exit_code, 65);
+  EXPECT_THAT(answer.people, testing::HasSubstr("calibrated before they were written"));
+  EXPECT_EQ(run({"impact", path}).exit_code, 0);
+  EXPECT_EQ(run({"export", path, "--csv", folder_ / "g.csv"}).exit_code, 0);
 }
 
 // Three and a half hours in a chamber from 0 to 30 C, in one pose: no constants, and the drift.

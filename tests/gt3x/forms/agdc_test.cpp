@@ -120,6 +120,28 @@ TEST(Agdc, TemperaturesEqualTheVendors) {
   EXPECT_EQ(row, die_adc.size());
 }
 
+// Of samples that are in g, coefficients say how they became so, where they are there at all.
+TEST(Agdc, WhatWasAppliedAlreadyNeedsNoCoefficients) {
+  const auto bare = parse_agdc_calibration(R"({"isCalibrated":true})", 32);
+  ASSERT_OK(bare);
+  EXPECT_TRUE(bare->already_applied);
+  EXPECT_FALSE(bare->constants);
+  std::string json = R"({"isCalibrated":true,"calibrationMethod":2)";
+  for (const char* key :
+       {"offsetX", "offsetY", "offsetZ", "sensitivityXX", "sensitivityYY", "sensitivityZZ",
+        "sensitivityXY", "sensitivityXZ", "sensitivityYZ", "zeroGOffsetX", "zeroGOffsetY",
+        "zeroGOffsetZ", "positiveZeroGOffsetX", "positiveZeroGOffsetY", "positiveZeroGOffsetZ",
+        "negativeZeroGOffsetX", "negativeZeroGOffsetY", "negativeZeroGOffsetZ"}) {
+    json += std::string(",\"") + key + "_32\":250";
+  }
+  const auto full = parse_agdc_calibration(json + "}", 32);
+  ASSERT_OK(full);
+  ASSERT_TRUE(full->constants);
+  EXPECT_EQ(full->constants->zero_lsb, (PerAxis<int>{250, 250, 250}));
+  EXPECT_FAILS(parse_agdc_calibration(R"({"isCalibrated":false,"calibrationMethod":2})", 32),
+               ErrorCode::bad_data);
+}
+
 TEST(Agdc, Refuses) {
   for (const char* wrong : {"", "[]", "{}", "{\"offsetX_32\": \"a\"}", "{\"offsetX_32\": 1e999}"}) {
     EXPECT_FAILS(parse_agdc_calibration(wrong, 32), ErrorCode::bad_data);

@@ -101,6 +101,9 @@ TEST(Clock, TimesAreSaidWithTheirOffset) {
   EXPECT_EQ(clock_time({ClockKind::utc, 0, ""}, kTime), "2015-04-09T14:04:00+00:00");
   EXPECT_EQ(clock_time({ClockKind::utc, std::nullopt, ""}, kTime), "2015-04-09T14:04:00Z");
   EXPECT_EQ(clock_time({ClockKind::unknown, std::nullopt, ""}, kTime), "2015-04-09T14:04:00");
+  const UtcTime half = from_unix_seconds(kTime) + from_seconds(0.5);
+  EXPECT_EQ(clock_time({ClockKind::utc, -300, ""}, half), "2015-04-09T09:04:00.5-05:00");
+  EXPECT_EQ(clock_time({ClockKind::unknown, std::nullopt, ""}, half), "2015-04-09T14:04:00.5");
 }
 
 TEST(Clock, OffsetsAreReadInTheirForms) {

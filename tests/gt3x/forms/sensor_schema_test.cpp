@@ -53,6 +53,18 @@ TEST(SensorSchema, EveryKindOfColumn) {
   EXPECT_EQ(samples->front(), (std::vector<double>{0.5, -2, 127.5, 26, -3}));
 }
 
+// The vendor's public description (SensorData.md) compares the label without regard to case.
+TEST(SensorSchema, TemperatureIsKnownInCapitalsAndSmallLetters) {
+  for (const char* label : {"Temperature", "temperature", "TEMPERATURE", "Temperatur"}) {
+    const auto schema = parse_sensor_schema(made_schema({{label, 3, 0, 16, 1}}));
+    ASSERT_OK(schema);
+    const double plus_c = std::string(label) == "Temperatur" ? 0 : 21;
+    EXPECT_EQ(parse_sensor_data(*schema, Bytes{7, 0, 0, 5}).value(),
+              (std::vector<std::vector<double>>{{5 + plus_c}}))
+        << label;
+  }
+}
+
 TEST(SensorSchema, WhatCannotBeIsRefused) {
   const Bytes whole = made_schema(kColumns);
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -68,6 +80,7 @@ TEST(SensorSchema, WhatCannotBeIsRefused) {
   const auto schema = parse_sensor_schema(whole);
   ASSERT_OK(schema);
   EXPECT_FAILS(parse_sensor_data(*schema, Bytes{7}), ErrorCode::bad_data);
+  EXPECT_FAILS(schema_of_sensor_data(Bytes{7}), ErrorCode::bad_data);
   EXPECT_FAILS(parse_sensor_data(*schema, Bytes{8, 0}), ErrorCode::bad_data);
   EXPECT_FAILS(parse_sensor_data(*schema, Bytes(2 + 11, 0)), ErrorCode::bad_data);
   EXPECT_TRUE(parse_sensor_data(*schema, Bytes{7, 0})->empty());

@@ -26,6 +26,30 @@ TEST(SmallRecords, NamesAndNumbersOfTypes) {
   }
 }
 
+// The table of old_lux(), a row each. Oracle: the example of the vendor's description (lux.bin.md) for
+// GT3X+, with its limits for ActiSleep+.
+TEST(SmallRecords, LuxOfTheOldForm) {
+  struct Case {
+    int reading;
+    double gt3x_plus;
+    double actisleep_plus;
+  };
+  for (const Case& one : std::vector<Case>{{0, 0, 0},
+                                           {19, 0, 0},
+                                           {20, 25, 65},
+                                           {0xFFFF, 0, 0},
+                                           {0xFFFE, 2500, 6000},
+                                           {2200, 2500, 6000},
+                                           {1100, 1375, 3575},
+                                           {21, 26.25, 68.25}}) {
+    EXPECT_EQ(old_lux("NEO1B34100019", one.reading), one.gt3x_plus) << one.reading;
+    EXPECT_EQ(old_lux("neo1b34100019", one.reading), one.gt3x_plus) << one.reading;
+    EXPECT_EQ(old_lux("MRA1C16110020", one.reading), one.actisleep_plus) << one.reading;
+    EXPECT_FALSE(old_lux("CLE1B34100019", one.reading)) << one.reading;
+    EXPECT_FALSE(old_lux("", one.reading)) << one.reading;
+  }
+}
+
 // The rows of the table in the header. The beacons are the example of the vendor's description.
 TEST(SmallRecords, SaysWhatEveryTypeSays) {
   const std::string beacon = "TAS0C32140026";

@@ -49,12 +49,16 @@ TEST(ImuCsv, IsTheVendorsLineForLine) {
 }
 
 // One column of one byte, so that what a second of another length becomes can be seen.
-Bytes made_imu_log(const std::vector<std::size_t>& samples_per_second) {
-  Bytes log;
-  Bytes schema = {1, 0, 1, 0, 0, 0, 0, 0, 8, 0, 0, 0, 0};
-  const std::string label = "Count           ";
+void append_schema(Bytes& log, std::uint8_t id, std::string label = "Count") {
+  Bytes schema = {id, 0, 1, 0, 0, 0, 0, 0, 8, 0, 0, 0, 0};
+  label.resize(16, ' ');
   schema.insert(schema.end(), label.begin(), label.end());
   append_record(log, RecordType::sensor_schema, tests::kStart, schema);
+}
+
+Bytes made_imu_log(const std::vector<std::size_t>& samples_per_second) {
+  Bytes log;
+  append_schema(log, 1);
   for (std::uint32_t second = 0; second < samples_per_second.size(); ++second) {
     Bytes payload = {1, 0};
     for (std::size_t i = 0; i < samples_per_second[second]; ++i) {
@@ -101,6 +105,48 @@ TEST(ImuCsv, WhatCannotBeReadIsCountedAndLeftOut) {
   ASSERT_OK(csv);
   EXPECT_EQ(csv->second.seconds, 2U);
   EXPECT_EQ(csv->second.unreadable_records, 4U);
+}
+
+// A second of one sample, by each of the schemas in turn. Left out is only what has other columns.
+TEST(ImuCsv, SeveralSchemasOfTheSameColumnsAreRead) {
+  MemoryEnv memory;
+  Bytes log;
+  append_schema(log, 0);
+  append_schema(log, 1);
+  append_schema(log, 2, "Other");
+  for (std::uint8_t second = 0; second < 6; ++second) {
+    const auto id = static_cast<std::uint8_t>(second % 3);
+    append_record(log, RecordType::sensor_data, tests::kStart + second, Bytes{id, 0, second});
+  }
+  append_schema(log, 1, "Other");  // from here on
+  append_record(log, RecordType::sensor_data, tests::kStart + 6, Bytes{1, 0, 6});
+  ASSERT_OK(tests::put_recording(memory.files, "a.gt3x", log));
+  const auto csv = imu_of(memory.files, "a.gt3x");
+  ASSERT_OK(csv);
+  EXPECT_EQ(csv->second.seconds, 4U);
+  EXPECT_EQ(csv->second.other_columns, 3U);
+  EXPECT_EQ(csv->second.unreadable_records, 0U);
+  const auto lines = lines_of(csv->first);
+  ASSERT_EQ(lines.size(), 11 + 4 * 100U);
+  EXPECT_EQ(lines[11], "2015-04-09T14:04:00.0000000,0");
+  EXPECT_EQ(lines[111], "2015-04-09T14:04:01.0000000,1");
+  EXPECT_EQ(lines[211], "2015-04-09T14:04:03.0000000,3");
+  EXPECT_EQ(lines[311], "2015-04-09T14:04:04.0000000,4");
+}
+
+TEST(ImuCsv, ASchemaMoreThanSixtyFourIsLeftOut) {
+  MemoryEnv memory;
+  Bytes log;
+  for (std::uint8_t id = 0; id < 65; ++id) {
+    append_schema(log, id);
+  }
+  append_record(log, RecordType::sensor_data, tests::kStart, Bytes{63, 0, 1});
+  append_record(log, RecordType::sensor_data, tests::kStart + 1, Bytes{64, 0, 1});
+  ASSERT_OK(tests::put_recording(memory.files, "a.gt3x", log));
+  const auto csv = imu_of(memory.files, "a.gt3x");
+  ASSERT_OK(csv);
+  EXPECT_EQ(csv->second.seconds, 1U);
+  EXPECT_EQ(csv->second.unreadable_records, 2U);
 }
 
 TEST(ImuCsv, ARecordingWithoutTheSensorIsRefused) {

@@ -339,8 +339,10 @@ TEST(RawCsv, RawCountsOfAnAgdcBecomeG) {
 }
 
 // Of raw counts an .agdc says 1 LSB/g: as a scale of calibrated ones it would make 342 g of 1.34 g.
+// Coefficients they need none.
 TEST(RawCsv, CalibratedSamplesOfAnAgdcNeedAScale) {
-  for (const bool has_scale : {false, true}) {
+  for (const auto& [has_scale, has_coefficients] :
+       {std::pair(false, true), std::pair(true, true), std::pair(true, false)}) {
     MemoryEnv memory;
     Bytes payload;
     append_activity3(payload, std::vector<Counts>(32, Counts{342, 0, 0}));
@@ -349,7 +351,7 @@ TEST(RawCsv, CalibratedSamplesOfAnAgdcNeedAScale) {
     std::string calibration = R"({"isCalibrated":true,"calibrationMethod":2)";
     for (const char* key : {"offsetX", "offsetY", "offsetZ", "sensitivityXX", "sensitivityYY",
                             "sensitivityZZ", "sensitivityXY", "sensitivityXZ", "sensitivityYZ"}) {
-      calibration += std::string(",\"") + key + "_32\":25000";
+      calibration += has_coefficients ? std::string(",\"") + key + "_32\":25000" : "";
     }
     auto out = RecordingWriter::create(memory.files, "a.agdc").value();
     ASSERT_OK(out.add("log.bin", log));

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <limits>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
@@ -88,23 +89,45 @@ TEST(RecordsCsv, TemperaturesAreTheVendors) {
   }
 }
 
-TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
+// As `export --time` has them: a Z where the recording's clock is UTC, which raw counts tell.
+TEST(RecordsCsv, TimesByUtcAreSaidToBe) {
   MemoryEnv memory;
-  {
+  Bytes log;
+  append_record(log, RecordType::battery, tests::kStart, Bytes{0x68, 0x10});
+  append_record(log, RecordType::activity3, tests::kStart, Bytes(9));
+  ASSERT_OK(tests::put_recording(memory.files, "a.agdc", log));
+  const auto battery = records_of(memory.files, "a.agdc", RecordType::battery);
+  ASSERT_OK(battery);
+  EXPECT_EQ(battery->lines, (std::vector<std::string>{"time,unix_s,battery_v",
+                                                      "2015-04-09T14:04:00Z,1428588240,4.2"}));
+}
+
+// Oracle: the example of the vendor's description (lux.bin.md): 0, 19, 65535, 2200 and 1100 of a
+// GT3X+ are 0, 0, 0, 2500 and 1375 lux. What the readings of another unit are is not public.
+TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
+  using testing::ElementsAre;
+  MemoryEnv memory;
+  const auto values_of = [&](const std::string& serial) {
+    std::string info = tests::made_info();
+    info.replace(info.find("MOS2A45130450"), serial.size(), serial);
     auto out = RecordingWriter::create(memory.files, "old.gt3x").value();
-    ASSERT_OK(out.add("activity.bin", Bytes(9)));
-    ASSERT_OK(out.add("lux.bin", Bytes{0x00, 0x00, 0x13, 0x00, 0xFF, 0xFF, 0x98, 0x08, 0x4C}));
-    ASSERT_OK(out.add("info.txt", std::string_view(tests::made_info())));
-    ASSERT_OK(out.commit());
-  }
-  const auto lux = records_of(memory.files, "old.gt3x", RecordType::lux);
-  ASSERT_OK(lux);
-  ASSERT_EQ(lux->lines.size(), 5U);
-  EXPECT_EQ(lux->lines[1].substr(lux->lines[1].rfind(',')), ",0");
-  EXPECT_EQ(lux->lines[2].substr(lux->lines[2].rfind(',')), ",19");
-  EXPECT_EQ(lux->lines[3].substr(lux->lines[3].rfind(',')), ",");
-  EXPECT_EQ(lux->lines[4].substr(lux->lines[4].rfind(',')), ",2200");
-  EXPECT_EQ(lux->tally.unreadable_records, 1U);
+    EXPECT_OK(out.add("activity.bin", Bytes(9)));
+    EXPECT_OK(out.add("lux.bin",
+                      Bytes{0x00, 0x00, 0x13, 0x00, 0xFF, 0xFF, 0x98, 0x08, 0x4C, 0x04, 0x4C}));
+    EXPECT_OK(out.add("info.txt", std::string_view(info)));
+    EXPECT_OK(out.commit());
+    const auto lux = records_of(memory.files, "old.gt3x", RecordType::lux).value();
+    EXPECT_EQ(lux.tally.unreadable_records, 1U);
+    std::vector<std::string> values;
+    for (const std::string& line : lux.lines) {
+      values.push_back(line.substr(line.rfind(',') + 1));
+    }
+    return values;
+  };
+  EXPECT_THAT(values_of("NEO1C16110020"), ElementsAre("lux", "0", "0", "0", "2500", "1375"));
+  EXPECT_THAT(values_of("MRA1C16110020"), ElementsAre("lux", "0", "0", "0", "6000", "3575"));
+  EXPECT_THAT(values_of("CLE1C16110020"),
+              ElementsAre("lux_raw", "0", "19", "65535", "2200", "1100"));
   EXPECT_FAILS(records_of(memory.files, "old.gt3x", RecordType::battery), ErrorCode::bad_data);
 }
 

@@ -8,6 +8,7 @@
 #include "repair/archive/output_lock.h"
 #include "repair/batch/reading.h"
 #include "repair/batch/stoppable_files.h"
+#include "repair/made_agdc.h"
 #include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
@@ -91,6 +92,28 @@ TEST(Requests, ThatAreStoppedReadNothingMore) {
   // Files that no thread had begun have no verdict.
   const auto nothing = [](std::size_t) {};
   EXPECT_FAILS(run_scan(memory.env, {{"a.gt3x"}, "", 1}, {nothing, &stop}), ErrorCode::io);
+}
+
+TEST(Reading, SaysTheScaleOfAnAgdcWhereItHasOne) {
+  for (const bool calibrated : {false, true}) {
+    MemoryEnv memory;
+    tests::MadeAgdc made;
+    made.calibrated = calibrated;
+    ASSERT_OK(made.write(memory.files, "a.agdc"));
+    auto recording = gt3x::Recording::open(memory.files, "a.agdc");
+    ASSERT_OK(recording);
+    auto stream = gt3x::SampleStream::open(*recording, {});
+    ASSERT_OK(stream);
+    ASSERT_OK(gt3x::read_all_rows(*stream, gt3x::RowValue::g_float32));
+    const auto reading = reading_of(*recording, *stream);
+    const auto inspection = inspect(memory.files, "a.agdc");
+    ASSERT_OK(reading);
+    ASSERT_OK(inspection);
+    EXPECT_EQ(reading->accel_scale_lsb_per_g,
+              calibrated ? std::optional<double>(256) : std::nullopt);
+    EXPECT_EQ(reading->accel_scale_lsb_per_g, inspection->accel_scale_lsb_per_g);
+    EXPECT_EQ(reading->constants, inspection->constants);
+  }
 }
 
 // What a reading tells of its file is what inspect() tells of it.

@@ -7,6 +7,7 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "gt3x_made_log.h"
+#include "repair/made_agdc.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -49,6 +50,20 @@ TEST(Trace, ASecondHasItsExtremesAndItsDeviation) {
   }
   trace = Trace::from_magnitudes("a", 1000, 20, values);
   EXPECT_TRUE(std::isnan(second_at(trace, 1001).sd_g)) << "more than half are missing";
+}
+
+TEST(Trace, AnAgdcIsTakenWhereItsSamplesAreInG) {
+  MemoryEnv memory;
+  tests::MadeAgdc made;
+  ASSERT_OK(made.write(memory.files, "a.agdc"));
+  EXPECT_FAILS(Trace::load(memory.files, "a.agdc"), ErrorCode::bad_data);
+  made.calibrated = true;
+  made.coefficients = false;
+  ASSERT_OK(made.write(memory.files, "a.agdc"));
+  const auto trace = Trace::load(memory.files, "a.agdc");
+  ASSERT_OK(trace);
+  EXPECT_EQ(trace->size(), 240U * 32);
+  EXPECT_NEAR(trace->magnitude_g(100), 1, 0.02);
 }
 
 // A clock that leaps ahead by hours and back again.

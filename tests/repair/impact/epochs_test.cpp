@@ -4,6 +4,7 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/made_agdc.h"
 #include "repair/made_recording.h"
 
 namespace sixpoint::repair {
@@ -27,6 +28,23 @@ Result<EpochSeries> series_of(const MadeRecording& made, const EpochOptions& opt
   EXPECT_OK(log ? made.write(memory.files, "a.gt3x", *log) : made.write(memory.files, "a.gt3x"));
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(memory.files, "a.gt3x"));
   return epochs_of(recording, options);
+}
+
+TEST(Epochs, AnAgdcIsTakenWhereItsSamplesAreInG) {
+  const auto series_of_agdc = [](const tests::MadeAgdc& made) {
+    MemoryEnv memory;
+    EXPECT_OK(made.write(memory.files, "a.agdc"));
+    auto recording = gt3x::Recording::open(memory.files, "a.agdc").value();
+    return epochs_of(recording, {});
+  };
+  tests::MadeAgdc made;
+  EXPECT_FAILS(series_of_agdc(made), ErrorCode::bad_data);
+  made.calibrated = true;
+  made.coefficients = false;
+  const auto series = series_of_agdc(made);
+  ASSERT_OK(series);
+  EXPECT_EQ(series->epochs.size(), 48U);
+  EXPECT_LT(series->epochs[0].enmo_mg, 5) << "at rest, by 256 LSB/g";
 }
 
 // Half of the samples at 1.5 g, half at 0.5 g. Oracle: by hand.

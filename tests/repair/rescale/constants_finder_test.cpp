@@ -6,6 +6,7 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "repair/jig_constants.h"
+#include "repair/made_agdc.h"
 #include "repair/six_sides.h"
 
 namespace sixpoint::repair {
@@ -125,6 +126,40 @@ TEST_F(Finder, ACalibrationFileThatIsMissingIsAReasonAndNoError) {
   ConstantsFinderOptions options;
   options.calibration_file = "none.gt3x";
   expect_none(options, "cannot be used");
+}
+
+// Before: by the offset and the matrix, which fit this unit; its diagonal alone leaves more than 5 mg.
+TEST_F(Finder, TheResidualBeforeOfAnAgdcIsThatOfItsMatrix) {
+  tests::MadeAgdc made;
+  ASSERT_OK(made.write(memory_.files, "in.agdc"));
+  const Survey raw = survey(memory_.files, "in.agdc").value();
+  const auto solved = solve_survey("in.agdc", raw, {});
+  ASSERT_OK(solved);
+  EXPECT_LT(solved->residual_before_mg, 0.5);
+  ASSERT_TRUE(solved->calibration);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    EXPECT_NEAR(solved->calibration->zero_lsb[a], tests::MadeAgdc::kOffset[a], 2) << "raw counts";
+  }
+  made.calibrated = true;
+  ASSERT_OK(made.write(memory_.files, "in.agdc"));
+  const auto calibrated = solve_survey("in.agdc", survey(memory_.files, "in.agdc").value(), {});
+  EXPECT_FAILS(calibrated, ErrorCode::bad_data);
+  EXPECT_THAT(calibrated.error().what, HasSubstr("calibrated before they were written"));
+}
+
+// The command and Python print these notes and no others.
+TEST_F(Finder, TheNotesSayWhatTheConstantsAreNotFor) {
+  const auto notes_of = [&](const char* firmware) {
+    Survey found = survey_;
+    found.facts.firmware = firmware;
+    return testing::PrintToString(solve_survey("in.gt3x", found, {}).value().notes);
+  };
+  EXPECT_THAT(notes_of("1.3.0"), HasSubstr("(firmware 1.3.0 chose it): its constants repair no"));
+  EXPECT_THAT(notes_of("1.5.0"), testing::Not(HasSubstr("repair no")));
+  Survey two = survey_;
+  two.facts.other_firmware = "1.6.0";
+  EXPECT_THAT(testing::PrintToString(solve_survey("in.gt3x", two, {}).value().notes),
+              HasSubstr("1.5.0 and 1.6.0, which lay the axes"));
 }
 
 TEST_F(Finder, ARepairedRecordingIsNotSolved) {

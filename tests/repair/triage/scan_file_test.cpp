@@ -10,7 +10,9 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "repair/made_agd.h"
+#include "repair/made_agdc.h"
 #include "repair/six_sides.h"
+#include "repair/triage/inspection.h"
 #include "repair/triage/survey.h"
 #include "shared_data.h"
 #include "temporary_folder.h"
@@ -40,6 +42,38 @@ ScannedFile scanned(const tests::MadeRecording& made) {
   MemoryFiles files;
   EXPECT_OK(made.write(files, "in.gt3x"));
   return scan_file(files, "in.gt3x");
+}
+
+// Evidence is what the applied calibration makes of the samples; without one there is none.
+TEST(ScanFile, TheEvidenceOfAnAgdcIsThatOfItsCalibration) {
+  const auto scan_of = [](const tests::MadeAgdc& made) {
+    MemoryFiles files;
+    EXPECT_OK(made.write(files, "in.agdc"));
+    return scan_file(files, "in.agdc");
+  };
+  tests::MadeAgdc made;
+  for (const bool calibrated : {false, true}) {
+    made.calibrated = calibrated;
+    const ScannedFile found = scan_of(made);
+    EXPECT_EQ(found.verdict, "not_affected");
+    EXPECT_LT(found.evidence_mg.value(), 2);
+    EXPECT_THAT(found.reasons, Not(Contains(HasSubstr("do not fit")))) << calibrated;
+  }
+  made.calibrated = false;
+  made.calibration = false;
+  const ScannedFile without = scan_of(made);
+  EXPECT_FALSE(without.evidence_mg);
+  EXPECT_THAT(without.reasons, Contains(HasSubstr("no calibration.json that fits them")));
+}
+
+// Oracle: inspect, which follows the export of the same file (raw_csv_test.cpp has the vendor's CSV).
+TEST(ScanFile, TheEvidenceOfARealAgdcIsThatOfInspect) {
+  SIXPOINT_NEED_SHARED("data/agdc/CPW1C48210013_baseline.agdc");
+  const std::string path = shared_file("data/agdc/CPW1C48210013_baseline.agdc");
+  const auto inspected = inspect(posix_env().files, path);
+  ASSERT_OK(inspected);
+  EXPECT_DOUBLE_EQ(scan_file(posix_env().files, path).evidence_mg.value(),
+                   inspected->still->magnitude.p95_mg);
 }
 
 // Oracle: a row each of the table of triage.h.

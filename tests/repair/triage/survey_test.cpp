@@ -5,8 +5,10 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/made_agdc.h"
 #include "repair/old_form.h"
 #include "repair/six_sides.h"
+#include "repair/triage/inspection.h"
 #include "shared_data.h"
 
 namespace sixpoint::repair {
@@ -39,6 +41,42 @@ TEST(Survey, ADateOfCalibrationBehindTheRecordingIsNone) {
   }
   made.start = 0;  // a clock that was never set says nothing about the other
   EXPECT_EQ(date_of_constants(facts_with(1'395'619'200)), from_unix_seconds(1'395'619'200));
+}
+
+// The table of Survey::agdc, a row each. Oracle: the unit was made to fit its offset and matrix; by the
+// six-point entries of calibration.json it is more than 200 mg from 1 g. inspect says the same.
+TEST(Survey, AnAgdcIsJudgedByWhatIsApplied) {
+  MemoryFiles files;
+  const auto found_of = [&](const tests::MadeAgdc& made) {
+    EXPECT_OK(made.write(files, "in.agdc"));
+    return survey(files, "in.agdc").value();
+  };
+  tests::MadeAgdc made;
+  const Survey raw = found_of(made);
+  EXPECT_TRUE(raw.raw_counts);
+  ASSERT_TRUE(raw.agdc);
+  EXPECT_GE(raw.magnitude.blocks, 40U);
+  EXPECT_LT(raw.magnitude.worst_mg, 2);
+  EXPECT_DOUBLE_EQ(raw.magnitude.p95_mg, inspect(files, "in.agdc")->still->magnitude.p95_mg);
+  made.calibration = false;
+  const Survey unknown = found_of(made);
+  EXPECT_TRUE(unknown.raw_counts);
+  EXPECT_FALSE(unknown.agdc);
+  made.calibration = true;
+  made.calibrated = true;
+  for (const bool coefficients : {true, false}) {
+    made.coefficients = coefficients;
+    const Survey calibrated = found_of(made);
+    EXPECT_FALSE(calibrated.raw_counts);
+    ASSERT_TRUE(calibrated.agdc && calibrated.agdc->already_applied);
+    EXPECT_GE(calibrated.magnitude.blocks, 40U);
+    EXPECT_LT(calibrated.magnitude.worst_mg, 2);
+    ASSERT_TRUE(calibrated.constants_problem);
+    EXPECT_NE(calibrated.constants_problem->what.find("calibrated before they were written"),
+              std::string::npos);
+  }
+  made.scale_lsb_per_g = 1;  // as of raw counts
+  EXPECT_TRUE(found_of(made).raw_counts);
 }
 
 TEST(Survey, SaysWhatTheFileHolds) {
