@@ -15,7 +15,7 @@ void GapList::add(const SampleItem& item) {
   }
   ++count_;
   if (listed_.size() < kMostListed) {
-    listed_.push_back({item.unix_time, item.seconds, kind});
+    listed_.push_back({item.unix_time, item.seconds, kind, item.filled});
   }
 }
 

@@ -23,6 +23,7 @@ struct Gap {
   std::uint32_t start = 0;  // Unix time
   std::uint64_t seconds = 0;
   GapKind kind = GapKind::unexplained;
+  bool filled = true;  // fills_gap(); what is not filled may have been recorded later in the file
 };
 
 class GapList {

@@ -79,6 +79,32 @@ class Drop(InFolder):
         self.assertNotIn(START + 3, frame.index)
         self.assertEqual(frame.index[90], START + 5)
 
+    def of_seconds(self, *pieces):
+        """The frame of seconds from START on; "asleep" is an EVENT. The seconds of its rows, and of its sleep."""
+        log, last = b"", 0
+        for second in (second for piece in pieces for second in piece):
+            if second == "asleep":
+                log += record(3, START + last, b"\x08")
+                continue
+            log += record(0, START + second, packed(samples_of(second % 2000)))
+            last = second
+        with FileReader(write_recording(self.folder / "clock.gt3x", log)) as reader:
+            frame = reader.to_pandas()
+        seconds = (frame.index.to_numpy() // 1).astype(int)[::30] - START
+        return list(seconds), list(seconds[frame["IdleSleepMode"].to_numpy()[::30]])
+
+    def test_keeps_what_was_recorded_where_the_clock_was_set_back(self):
+        rows, asleep = self.of_seconds(range(7200, 7500), range(120), range(180, 240))
+        self.assertEqual(rows, [*range(7200, 7500), *range(120), *range(180, 240)])
+        self.assertEqual(asleep, [])
+        rows, asleep = self.of_seconds(range(7200, 7500), range(120), ["asleep"], range(180, 240))
+        self.assertEqual(rows, [*range(7200, 7500), *range(240)])
+        self.assertEqual(asleep, [*range(120, 180)])
+
+    def test_keeps_what_was_recorded_in_a_gap_after_the_clock_came_back(self):
+        rows, _ = self.of_seconds(range(10), range(7200, 7220), range(10, 40))
+        self.assertEqual(rows, [*range(10), *range(7200, 7220), *range(10, 40)])
+
     def test_takes_lines_of_info_that_are_blank(self):
         info = INFO.replace("Rate: 30", "Rate: 30.0") + "Age: \r\nHeight: tall\r\nDownload Date: \r\nStop Date: \r\n"
         path = write_recording(self.folder / "blank.gt3x", record(0, START, packed(samples_of(0))), info)

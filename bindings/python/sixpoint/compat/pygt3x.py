@@ -220,10 +220,13 @@ def _rows_of_pygt3x(recording: Recording) -> tuple[NDArray[np.bool_], NDArray[np
     asleep = np.zeros(len(recording), dtype=bool)
     if recording.gaps:
         seconds = recording.time.view("int64") // 1_000_000_000
-        for begin, length, kind in recording.gaps_unix():
-            first, last = np.searchsorted(seconds, (begin, begin + length))
+        order = np.argsort(seconds, kind="stable")  # a clock may have been set back
+        for begin, length, kind, filled in recording._gaps:
+            if not filled:
+                continue  # rows of these seconds were recorded, behind a leap of the clock
+            first, last = np.searchsorted(seconds, (begin, begin + length), sorter=order)
             if kind == "idle_sleep":
-                asleep[first:last] = True
+                asleep[order[first:last]] = True
             else:
-                kept[first:last] = False
+                kept[order[first:last]] = False
     return kept, asleep
