@@ -19,8 +19,7 @@ void GapList::add(const SampleItem& item) {
   }
 }
 
-Result<GapList> gaps_of(Recording& recording) {
-  SampleReader reader(recording);
+Result<GapList> gaps_of(SampleReader& reader) {
   GapList gaps;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
