@@ -114,6 +114,25 @@ class Drop(InFolder):
             self.assertEqual(reader.info.sample_rate, 30)
             self.assertIsInstance(reader.info.sample_rate, int)
 
+    def test_reads_what_stands_in_the_archive_as_read_does(self):
+        path = small(self.folder, seconds=(0, 1))
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("calibration.json", '\ufeff{"isCalibrated": true}')
+        with open(path, "ab") as file:
+            file.write(bytes(70_000))  # zipfile finds no archive in it
+        with FileReader(path) as reader:
+            self.assertEqual(len(reader.to_pandas()), 60)
+            self.assertEqual(reader.calibration, {"isCalibrated": True})
+            self.assertIsNone(reader.temperature_calibration)
+
+    def test_a_calibration_that_is_no_json_is_bad_data(self):
+        for i, text in enumerate(("{oops", "[1]", "\xff".encode("latin-1"), "[" * 100_000)):
+            path = small(self.folder, seconds=(0, 1)).rename(self.folder / f"{i}.gt3x")
+            with zipfile.ZipFile(path, "a") as archive:
+                archive.writestr("temperature_calibration.json", text)
+            with self.assertRaisesRegex(sixpoint.BadDataError, "temperature_calibration.json is no JSON"):
+                FileReader(path).__enter__()
+
     def test_refuses_more_gaps_than_are_listed(self):
         with self.assertRaisesRegex(sixpoint.BadDataError, "more than 10000 gaps"):
             FileReader(many_gaps(self.folder)).__enter__()

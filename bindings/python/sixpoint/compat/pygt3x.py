@@ -14,11 +14,12 @@ import json
 import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional, Union
-from zipfile import ZipFile
 
 import numpy as np
 
+from .. import _core
 from .._errors import BadDataError
+from .._paths import as_bytes
 from .._recording import Recording, read
 
 if TYPE_CHECKING:
@@ -164,10 +165,21 @@ class FileReader:
         """Nothing is open any more."""
 
     def _json(self, name: str) -> Optional[dict[str, Any]]:
-        with ZipFile(self.file_name) as archive:
-            if name not in archive.namelist():
-                return None
-            return json.loads(archive.read(name))
+        text = _core.entry(as_bytes(self.file_name), name)
+        if text is None:
+            return None
+        try:
+            found = json.loads(text)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict):
+            raise BadDataError(
+                "bad_data",
+                f"{name} is no JSON object",
+                os.fsdecode(self.file_name),
+                "read the samples with sixpoint.read()",
+            )
+        return found
 
     @property
     def acceleration(self) -> NDArray[np.float64]:
