@@ -47,6 +47,14 @@ said <- tryCatch(read_gt3x_sixpoint("gaps.gt3x"), warning = conditionMessage)
 stopifnot(identical(said, "missingness has the first 10000 of 10001 gaps"))
 stopifnot(attr(read_gt3x_sixpoint("twice.gt3x"), "time_zone") == "-04:00:00")
 
+# Only raw counts are refused, and not what has a calibration.json beside samples in g.
+for (name in c("scaled.gt3x", "calibrated.agdc")) {
+  x <- same_as_export(name)
+  stopifnot(nrow(x) == 32, all(x$X == 0), all(x$Y == 0), all(x$Z == 1))
+}
+error <- tryCatch(read_gt3x_sixpoint("raw.agdc"), sixpoint_error = function(e) e)
+stopifnot(error$code == "bad_data", grepl("raw counts", error$what))
+
 broken <- tempfile(fileext = ".gt3x")
 writeBin(raw(100), broken)
 error <- tryCatch(read_gt3x_sixpoint(broken), sixpoint_error = function(e) e)
