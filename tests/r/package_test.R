@@ -55,6 +55,13 @@ for (name in c("scaled.gt3x", "calibrated.agdc")) {
 error <- tryCatch(read_gt3x_sixpoint("raw.agdc"), sixpoint_error = function(e) e)
 stopifnot(error$code == "bad_data", grepl("raw counts", error$what))
 
+# Without a Start Date, times count from the first sample.
+frame <- same_as_export("undated.gt3x")
+x <- read_gt3x_sixpoint("undated.gt3x")
+stopifnot(identical(attr(x, "time_index"), as.integer(round(0:29 * 100 / 30))))
+stopifnot(as.numeric(attr(x, "start_time")) == 1428588240, is.na(attr(x, "header")$`Start Date`))
+stopifnot(attr(frame, "start_time") == attr(x, "start_time"))
+
 broken <- tempfile(fileext = ".gt3x")
 writeBin(raw(100), broken)
 error <- tryCatch(read_gt3x_sixpoint(broken), sixpoint_error = function(e) e)

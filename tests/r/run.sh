@@ -45,6 +45,7 @@ matrix |= {f"sensitivity{axes}_32": 0 for axes in ("XY", "XZ", "YZ")}
 with_calibration("scaled.gt3x", 0, matrix)
 with_calibration("calibrated.agdc", 27, matrix | {"isCalibrated": True})
 with_calibration("raw.agdc", 27, matrix, "1")
+write_recording("undated.gt3x", record(0, START, packed(samples_of(0))), INFO.replace("Start Date: 635641850400000000\r\n", ""))
 write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")'
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
