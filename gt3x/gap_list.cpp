@@ -15,12 +15,11 @@ void GapList::add(const SampleItem& item) {
   }
   ++count_;
   if (listed_.size() < kMostListed) {
-    listed_.push_back({item.unix_time, item.seconds, kind});
+    listed_.push_back({item.unix_time, item.seconds, kind, item.filled});
   }
 }
 
-Result<GapList> gaps_of(Recording& recording) {
-  SampleReader reader(recording);
+Result<GapList> gaps_of(SampleReader& reader) {
   GapList gaps;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());

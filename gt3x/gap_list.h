@@ -23,6 +23,7 @@ struct Gap {
   std::uint32_t start = 0;  // Unix time
   std::uint64_t seconds = 0;
   GapKind kind = GapKind::unexplained;
+  bool filled = true;  // fills_gap(); what is not filled may have been recorded later in the file
 };
 
 class GapList {
@@ -42,7 +43,7 @@ class GapList {
   std::uint64_t seconds_ = 0;
 };
 
-// The gaps of a whole recording, by its clock; reads it once. Errors as SampleReader::next().
-Result<GapList> gaps_of(Recording& recording);
+// The gaps of what the reader has not read yet; reads it to its end. Errors as SampleReader::next().
+Result<GapList> gaps_of(SampleReader& reader);
 
 }  // namespace sixpoint::gt3x

@@ -10,6 +10,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "base/bytes.h"
 #include "bindings/python/failures.h"
 #include "bindings/python/reading.h"
 #include "bindings/python/values.h"
@@ -17,6 +18,8 @@
 #include "calib/poses/efficiency.h"
 #include "calib/poses/gravity.h"
 #include "calib/solve.h"
+#include "gt3x/container/byte_source.h"
+#include "gt3x/recording.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/requests.h"
 #include "repair/rescale/constants_finder.h"
@@ -54,6 +57,20 @@ py::dict inspect(const std::string& path, bool salvage) {
     return repair::inspect(watched.files(), path, {salvage, {}});
   });
   return dict_of(repair::inspection_to_json(value_or_throw(found), path));
+}
+
+// The bytes of a small entry of a recording; nothing where it has none of this name.
+std::optional<py::bytes> entry(const std::string& path, const std::string& name) {
+  const auto bytes = [&]() -> std::optional<Bytes> {
+    const py::gil_scoped_release released;
+    gt3x::Recording recording = value_or_throw(gt3x::Recording::open(posix_env().files, path));
+    if (!recording.has_entry(name)) {
+      return std::nullopt;
+    }
+    const auto source = value_or_throw(recording.open_entry(name));
+    return value_or_throw(gt3x::read_all(*source, 1U << 20U));
+  }();
+  return bytes ? std::optional(py::bytes(std::string(as_text(*bytes)))) : std::nullopt;
 }
 
 // The answer of run_scan() and run_repair(), which are watched on this thread.
@@ -136,6 +153,7 @@ PYBIND11_MODULE(_core, module) {
       .def("facts", &Reading::facts)
       .def("info", &Reading::info);
   module.def("inspect", &inspect, py::arg("path"), py::arg("salvage"));
+  module.def("entry", &entry, py::arg("path"), py::arg("name"));
   module.def("scan", &scan, py::arg("paths"), py::arg("options"));
   module.def("solve", &solve, py::arg("path"), py::arg("method"), py::arg("seed"),
              py::arg("strict_nonzero"), py::arg("population_prior"), py::arg("gravity_m_per_s2"),

@@ -138,7 +138,8 @@ py::dict Reading::facts() {
 py::list Reading::gaps() const {
   py::list gaps;
   for (const gt3x::Gap& gap : gaps_) {
-    gaps.append(py::make_tuple(gap.start, gap.seconds, std::string(gt3x::to_string(gap.kind))));
+    gaps.append(
+        py::make_tuple(gap.start, gap.seconds, std::string(gt3x::to_string(gap.kind)), gap.filled));
   }
   return gaps;
 }

@@ -42,7 +42,7 @@ class Reading {
 
   // Behind the end: a JSON document, as repair::reading_of().
   pybind11::dict facts();
-  pybind11::list gaps() const;  // behind facts(): (Unix time, seconds, kind)
+  pybind11::list gaps() const;  // behind facts(): (Unix time, seconds, kind, filled)
   pybind11::list info() const;  // pairs of info.txt
 
  private:

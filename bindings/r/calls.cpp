@@ -151,11 +151,6 @@ char* sixpoint_reading_open(const char* path, int fill, sixpoint_stop stop,
     options.fill = fill != 0;
     options.fill_zeros = true;
     auto stream = gt3x::SampleStream::open(*recording, options);
-    if (stream && recording->has_entry("calibration.json") &&
-        gt3x::holds_raw_counts(*recording, static_cast<double>(stream->rate_hz()))) {
-      return error_for_c({ErrorCode::bad_data, "this is an .agdc file of raw counts", path,
-                          "export it as a CSV by sixpoint export"});
-    }
     if (!stream) {
       return error_for_c(stream.error());
     }
@@ -165,6 +160,11 @@ char* sixpoint_reading_open(const char* path, int fill, sixpoint_stop stop,
     how.most_bytes = repair::half_of_memory() / (4 * sizeof(double) + 3 * sizeof(std::int16_t)) *
                      (3 * sizeof(std::int16_t));
     how.go_on = [&]() -> Status {
+      if (std::ranges::find(stream->scales(), 0, &gt3x::RowScale::lsb_per_g) !=
+          stream->scales().end()) {
+        return sixpoint::fail(ErrorCode::bad_data, "this is an .agdc file of raw counts", path,
+                              "export it as a CSV by sixpoint export");
+      }
       stopping = stop() != 0;
       return stopping ? Status(sixpoint::fail(ErrorCode::io, "it was stopped")) : Status();
     };

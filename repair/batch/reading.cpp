@@ -77,11 +77,15 @@ Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStre
   found.clock = reader.clock();
   SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
   SIXPOINT_CHECK(take_constants(found, recording, reader));
-  if (!stream.runs().empty()) {
-    found.start = stream.runs().front().unix_time;
-    const gt3x::RowRun& last = stream.runs().back();
-    found.end_s = last.unix_time + static_cast<double>(stream.rows() - last.first_row) /
-                                       static_cast<double>(stream.rate_hz());
+  const std::vector<gt3x::RowRun>& runs = stream.runs();
+  if (!runs.empty()) {
+    found.start = runs.front().unix_time;
+    for (std::size_t i = 0; i < runs.size(); ++i) {  // a clock may have been set back
+      const std::uint64_t end_row = i + 1 < runs.size() ? runs[i + 1].first_row : stream.rows();
+      found.end_s = std::max(found.end_s,
+                             runs[i].unix_time + static_cast<double>(end_row - runs[i].first_row) /
+                                                     static_cast<double>(stream.rate_hz()));
+    }
   }
   if (const auto start = info.start(); start && found.start) {
     found.first_after_start_s = std::int64_t{*found.start} - to_unix_seconds(*start);
@@ -92,7 +96,9 @@ Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStre
     found.irregular = reader.irregular();
     take_gaps(found, stream.gaps());
   } else {
-    SIXPOINT_ASSIGN(const gt3x::GapList gaps, gt3x::gaps_of(recording));
+    gt3x::SampleReader by_clock(recording);
+    SIXPOINT_ASSIGN(const gt3x::GapList gaps, gt3x::gaps_of(by_clock));
+    found.irregular = by_clock.irregular();
     take_gaps(found, gaps);
   }
   if (tally.checksum_failures + tally.damaged_stretches > 0) {

@@ -22,7 +22,7 @@ std::uint64_t half_of_memory();
 
 // As inspect() says it, but for what only a look at every sample tells: no still periods, no
 // clipped samples. `stream` was read to its end. Without filling, the recording is read once more
-// for its gaps; with salvage, for its losses.
+// for its gaps and what is irregular; with salvage, for its losses.
 Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStream& stream,
                               bool salvage = false);
 

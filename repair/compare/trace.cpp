@@ -41,17 +41,22 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     }
     if (!start) {
       start = item->unix_time;
-      trace.start_s_ = item->unix_time;
     }
-    if (item->unix_time < *start) {
-      continue;  // a clock that was set back
-    }
-    const std::uint64_t first = (item->unix_time - *start) * rate;
+    // Steps that it needs before the first: the clock was set back.
+    const std::uint64_t earlier = (std::max(*start, item->unix_time) - item->unix_time) * rate;
+    const std::uint64_t first = (std::max(*start, item->unix_time) - *start) * rate;
     const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
-    if (first + count > kMaxTraceSamples) {
+    if (std::max(earlier + trace.magnitude_g_.size(), first + count) > kMaxTraceSamples) {
       return fail(ErrorCode::bad_data,
-                  fmt::format("the recording is longer than {} samples", kMaxTraceSamples), path,
-                  "compare recordings of hours, not of weeks");
+                  fmt::format("the recording, from its earliest sample to its latest, is longer "
+                              "than {} samples",
+                              kMaxTraceSamples),
+                  path,
+                  "compare recordings of hours, not of weeks; inspect says where its clock leaps");
+    }
+    if (earlier > 0) {
+      trace.magnitude_g_.insert(trace.magnitude_g_.begin(), earlier, kMissing);
+      start = item->unix_time;
     }
     if (trace.magnitude_g_.size() < first + count) {  // not where the clock leapt back
       trace.magnitude_g_.resize(first + count, kMissing);
@@ -65,10 +70,11 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     }
   }
   trace.clock_ = reader.clock();
-  if (trace.magnitude_g_.empty()) {
+  if (!start) {
     return fail(ErrorCode::bad_data, "the recording holds no samples", path,
                 "check that the unit was started; download the recording again");
   }
+  trace.start_s_ = *start;
   return trace;
 }
 

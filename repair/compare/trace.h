@@ -25,7 +25,8 @@ inline constexpr std::uint64_t kMaxTraceSamples = 40'000'000;
 class Trace {
  public:
   // As gt3x::Recording and SampleReader have it; bad_data also for a recording without samples,
-  // without a rate or a scale, longer than kMaxTraceSamples, or of raw counts (.agdc).
+  // without a rate or a scale, longer than kMaxTraceSamples from the earliest sample to the latest,
+  // or of raw counts (.agdc).
   static Result<Trace> load(FileSystem& files, const std::string& path);
   // From g values at a fixed rate, for tests and for data from elsewhere. The grid begins at
   // start_s and holds one step per element; a magnitude that is not finite is a missing sample.

@@ -8,10 +8,14 @@
 //     MAD  = mean of |r - mean of r|       (Vaha-Ypya et al. 2015)
 //
 // with r the magnitude of a sample and the means over the recorded samples of the epoch. Epochs
-// begin at the first sample and follow one another by the file's own clock. Missing seconds are
-// filled for the counts' filter as the vendor's CSV fills them (the last sample again); behind more
-// than an hour without a sample the epochs begin anew. An epoch without a recorded sample, and one
-// that the recording ends within, is left out.
+// begin at the first sample and every epoch_s from there, by the file's own clock; before it as
+// well, where the clock was set back. Missing seconds are filled for the counts' filter as the
+// vendor's CSV fills them (fills_gap(); the last sample again, zeros while on USB). Where they are
+// not, and where the clock leaps, the filter begins anew, and what it lacks of the epochs on both
+// sides is filled with the nearest sample. Where the clock comes back into an epoch that it left,
+// its counts are the sums of the two parts; ENMO and MAD, about the mean of each part, are weighed
+// by samples. An epoch without a recorded sample, and one that the recording ends within, is left
+// out.
 #pragma once
 
 #include <array>
@@ -49,7 +53,7 @@ struct EpochSeries {
   int epoch_s = 0;
   double rate_hz = 0;
   bool has_counts = false;  // false for a rate that the counts do not know
-  std::vector<Epoch> epochs;
+  std::vector<Epoch> epochs;  // in order of time
 };
 
 // The largest recording: 400 days of epochs of a second would be 34 million.

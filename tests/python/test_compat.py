@@ -79,6 +79,32 @@ class Drop(InFolder):
         self.assertNotIn(START + 3, frame.index)
         self.assertEqual(frame.index[90], START + 5)
 
+    def of_seconds(self, *pieces):
+        """The frame of seconds from START on; "asleep" is an EVENT. The seconds of its rows, and of its sleep."""
+        log, last = b"", 0
+        for second in (second for piece in pieces for second in piece):
+            if second == "asleep":
+                log += record(3, START + last, b"\x08")
+                continue
+            log += record(0, START + second, packed(samples_of(second % 2000)))
+            last = second
+        with FileReader(write_recording(self.folder / "clock.gt3x", log)) as reader:
+            frame = reader.to_pandas()
+        seconds = (frame.index.to_numpy() // 1).astype(int)[::30] - START
+        return list(seconds), list(seconds[frame["IdleSleepMode"].to_numpy()[::30]])
+
+    def test_keeps_what_was_recorded_where_the_clock_was_set_back(self):
+        rows, asleep = self.of_seconds(range(7200, 7500), range(120), range(180, 240))
+        self.assertEqual(rows, [*range(7200, 7500), *range(120), *range(180, 240)])
+        self.assertEqual(asleep, [])
+        rows, asleep = self.of_seconds(range(7200, 7500), range(120), ["asleep"], range(180, 240))
+        self.assertEqual(rows, [*range(7200, 7500), *range(240)])
+        self.assertEqual(asleep, [*range(120, 180)])
+
+    def test_keeps_what_was_recorded_in_a_gap_after_the_clock_came_back(self):
+        rows, _ = self.of_seconds(range(10), range(7200, 7220), range(10, 40))
+        self.assertEqual(rows, [*range(10), *range(7200, 7220), *range(10, 40)])
+
     def test_takes_lines_of_info_that_are_blank(self):
         info = INFO.replace("Rate: 30", "Rate: 30.0") + "Age: \r\nHeight: tall\r\nDownload Date: \r\nStop Date: \r\n"
         path = write_recording(self.folder / "blank.gt3x", record(0, START, packed(samples_of(0))), info)
@@ -87,6 +113,25 @@ class Drop(InFolder):
             self.assertEqual((reader.info.stop_date, reader.info.start_date), (0, 635_641_850_400_000_000))
             self.assertEqual(reader.info.sample_rate, 30)
             self.assertIsInstance(reader.info.sample_rate, int)
+
+    def test_reads_what_stands_in_the_archive_as_read_does(self):
+        path = small(self.folder, seconds=(0, 1))
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("calibration.json", '\ufeff{"isCalibrated": true}')
+        with open(path, "ab") as file:
+            file.write(bytes(70_000))  # zipfile finds no archive in it
+        with FileReader(path) as reader:
+            self.assertEqual(len(reader.to_pandas()), 60)
+            self.assertEqual(reader.calibration, {"isCalibrated": True})
+            self.assertIsNone(reader.temperature_calibration)
+
+    def test_a_calibration_that_is_no_json_is_bad_data(self):
+        for i, text in enumerate(("{oops", "[1]", "\xff".encode("latin-1"), "[" * 100_000)):
+            path = small(self.folder, seconds=(0, 1)).rename(self.folder / f"{i}.gt3x")
+            with zipfile.ZipFile(path, "a") as archive:
+                archive.writestr("temperature_calibration.json", text)
+            with self.assertRaisesRegex(sixpoint.BadDataError, "temperature_calibration.json is no JSON"):
+                FileReader(path).__enter__()
 
     def test_refuses_more_gaps_than_are_listed(self):
         with self.assertRaisesRegex(sixpoint.BadDataError, "more than 10000 gaps"):

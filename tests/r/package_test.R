@@ -27,11 +27,6 @@ same_as_export <- function(path) {
 frame <- same_as_export("day1.gt3x")
 stopifnot(nrow(head(frame)) == 6, inherits(head(frame), "activity_df"))
 
-# Of an .agdc, samples that are in g already are read; raw counts are refused.
-same_as_export("in_g.agdc")
-refused <- tryCatch(read_gt3x_sixpoint("raw.agdc"), sixpoint_error = function(e) e)
-stopifnot(refused$code == "bad_data")
-
 # Zeros in place of missing seconds: what is not zero is what was recorded, and times have no hole.
 affected <- file.path(shared, "data/wgt3x-bt-affected/MOS2A45130451.gt3x")
 if (file.exists(affected)) {
@@ -51,6 +46,21 @@ if (file.exists(affected)) {
 said <- tryCatch(read_gt3x_sixpoint("gaps.gt3x"), warning = conditionMessage)
 stopifnot(identical(said, "missingness has the first 10000 of 10001 gaps"))
 stopifnot(attr(read_gt3x_sixpoint("twice.gt3x"), "time_zone") == "-04:00:00")
+
+# Only raw counts are refused, and not what has a calibration.json beside samples in g.
+for (name in c("scaled.gt3x", "calibrated.agdc", "in_g.agdc")) {
+  x <- same_as_export(name)
+  stopifnot(nrow(x) == 32, all(x$X == 0), all(x$Y == 0), all(x$Z == 1))
+}
+error <- tryCatch(read_gt3x_sixpoint("raw.agdc"), sixpoint_error = function(e) e)
+stopifnot(error$code == "bad_data", grepl("raw counts", error$what))
+
+# Without a Start Date, times count from the first sample.
+frame <- same_as_export("undated.gt3x")
+x <- read_gt3x_sixpoint("undated.gt3x")
+stopifnot(identical(attr(x, "time_index"), as.integer(round(0:29 * 100 / 30))))
+stopifnot(as.numeric(attr(x, "start_time")) == 1428588240, is.na(attr(x, "header")$`Start Date`))
+stopifnot(attr(frame, "start_time") == attr(x, "start_time"))
 
 broken <- tempfile(fileext = ".gt3x")
 writeBin(raw(100), broken)

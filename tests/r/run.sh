@@ -33,11 +33,21 @@ done
 PYTHONPATH=$source_folder/tests/python python3 -c '
 from made import *
 many_gaps(".")
-write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")
-for name, calibrated in (("in_g", "true"), ("raw", "false")):
-    path = write_recording(name + ".agdc", record(27, START, packed(samples_of(0))), INFO)
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("calibration.json", "{\"isCalibrated\": %s}" % calibrated)'
+def with_calibration(name, kind, calibration, scale="256.0"):
+    info = INFO.replace("Rate: 30", "Rate: 32").replace("Scale: 256.0", f"Scale: {scale}")
+    write_recording(name, record(kind, START, packed([(0, 0, 256)] * 32)), info)
+    with zipfile.ZipFile(name, "a") as archive:
+        archive.writestr("calibration.json", json.dumps(calibration))
+matrix = {"calibrationMethod": 2, "isCalibrated": False}
+for axis in "XYZ":
+    matrix |= {f"offset{axis}_32": 1, f"sensitivity{axis}{axis}_32": 25600}
+matrix |= {f"sensitivity{axes}_32": 0 for axes in ("XY", "XZ", "YZ")}
+with_calibration("scaled.gt3x", 0, matrix)
+with_calibration("calibrated.agdc", 27, matrix | {"isCalibrated": True})
+with_calibration("in_g.agdc", 27, {"isCalibrated": True})
+with_calibration("raw.agdc", 27, matrix, "1")
+write_recording("undated.gt3x", record(0, START, packed(samples_of(0))), INFO.replace("Start Date: 635641850400000000\r\n", ""))
+write_recording("twice.gt3x", record(0, START, packed(samples_of(0))), INFO + "TimeZone: 01:00:00\r\n")'
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
 for call in scan_16cpan03 read_gt3x_sixpoint; do

@@ -76,7 +76,7 @@ class Recording:
     # What times are made from: arrays and numbers, so that a recording can be pickled.
     _runs: NDArray[np.int64] = field(repr=False)
     _rate_hz: int = field(repr=False)
-    _gaps_unix: list[tuple[int, int, str]] = field(repr=False)
+    _gaps: list[tuple[int, int, str, bool]] = field(repr=False)
     _time: NDArray[np.datetime64] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
@@ -121,7 +121,7 @@ class Recording:
 
     def gaps_unix(self) -> list[tuple[int, int, str]]:
         """Return `gaps` as (first missing second, seconds, kind), in Unix time as the file has it."""
-        return self._gaps_unix
+        return [(start, seconds, kind) for start, seconds, kind, _ in self._gaps]
 
     @property
     def damage(self) -> dict[str, Any]:
@@ -206,7 +206,7 @@ def read(
         inspection=inspection,
         _runs=reading.runs(),
         _rate_hz=reading.rate_hz(),
-        _gaps_unix=reading.gaps(),
+        _gaps=reading.gaps(),
     )
 
 

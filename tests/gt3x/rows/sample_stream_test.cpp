@@ -155,7 +155,8 @@ TEST(SampleStream, NamesScalesAndGaps) {
   ASSERT_EQ(stream->gaps().listed().size(), 3U);
   EXPECT_EQ(stream->gaps().listed()[1].kind, GapKind::usb);
   EXPECT_EQ(stream->gaps().listed()[1].seconds, 4U);  // the record and the seconds behind it
-  const auto counted = gaps_of(recording);
+  SampleReader reader(recording);
+  const auto counted = gaps_of(reader);
   ASSERT_OK(counted);
   EXPECT_EQ(counted->seconds(), stream->gaps().seconds());
   EXPECT_EQ(counted->count(), 3U);

@@ -122,6 +122,8 @@ TEST(Reading, SaysWhatInspectSays) {
   gt3x::tests::append_second(log, 5, 31);
   gt3x::append_record(log, gt3x::RecordType::activity, gt3x::tests::kStart + 6, Bytes{0});
   gt3x::tests::append_second(log, 12);
+  gt3x::tests::append_second(log, 10'000);  // the clock leaps
+  gt3x::tests::append_second(log, 20);      // and is set back
   for (const bool fill : {true, false}) {
     MemoryEnv memory;
     ASSERT_OK(gt3x::tests::put_recording(memory.files, "a.gt3x", log));
@@ -144,6 +146,8 @@ TEST(Reading, SaysWhatInspectSays) {
                             "accel_scale_lsb_per_g",
                             "clock",
                             "start",
+                            "duration_s",
+                            "irregular",
                             "samples",
                             "records",
                             "constants",

@@ -66,20 +66,47 @@ TEST(Trace, AnAgdcIsTakenWhereItsSamplesAreInG) {
   EXPECT_NEAR(trace->magnitude_g(100), 1, 0.02);
 }
 
-// A clock that leaps ahead by hours and back again.
-TEST(Trace, NoSampleIsLostWhereTheClockLeapsBack) {
+Result<Trace> loaded(std::initializer_list<std::uint32_t> seconds) {
   Bytes log;
-  for (const std::uint32_t second : {0U, 1U, 20'000U, 20'001U, 2U, 3U}) {
+  for (const std::uint32_t second : seconds) {
     gt3x::tests::append_second(log, second);
   }
   MemoryEnv memory;
-  ASSERT_OK(gt3x::tests::put_recording(memory.files, "f", log));
-  const auto trace = Trace::load(memory.files, "f");
+  SIXPOINT_CHECK(gt3x::tests::put_recording(memory.files, "f", log));
+  return Trace::load(memory.files, "f");
+}
+
+// A clock that leaps ahead by hours and back again.
+TEST(Trace, NoSampleIsLostWhereTheClockLeapsBack) {
+  const auto trace = loaded({0, 1, 20'000, 20'001, 2, 3});
   ASSERT_OK(trace);
   ASSERT_EQ(trace->size(), 20'002U * 30);
   for (const std::size_t second : {0U, 3U, 20'000U, 20'001U}) {
     EXPECT_FALSE(std::isnan(trace->magnitude_g(30 * second))) << second;
   }
+}
+
+// A clock that was ahead at first, by hours and by less, and is set right. Oracle: the recording
+// whose clock was right.
+TEST(Trace, NoSampleIsLostBeforeTheFirst) {
+  const auto right = loaded({0, 1, 2, 500, 7200, 7201, 20'000});
+  const auto set_back = loaded({20'000, 7200, 7201, 0, 1, 2, 500});
+  ASSERT_OK(right);
+  ASSERT_OK(set_back);
+  EXPECT_EQ(set_back->start_s(), gt3x::tests::kStart);
+  ASSERT_EQ(set_back->size(), right->size());
+  for (std::size_t i = 0; i < right->size(); ++i) {
+    const float expected = right->magnitude_g(i);
+    const float found = set_back->magnitude_g(i);
+    ASSERT_TRUE(found == expected || (std::isnan(found) && std::isnan(expected))) << i;
+  }
+}
+
+// Years are no reason to hold a step for each of their samples.
+TEST(Trace, AClockThatIsSetBackByYearsIsRefused) {
+  constexpr std::uint32_t kTenYears_s = 10U * 365 * 86'400;
+  EXPECT_FAILS(loaded({kTenYears_s, 0, 1}), ErrorCode::bad_data);
+  EXPECT_FAILS(loaded({0, 1, kTenYears_s}), ErrorCode::bad_data);
 }
 
 }  // namespace

@@ -14,11 +14,12 @@ import json
 import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional, Union
-from zipfile import ZipFile
 
 import numpy as np
 
+from .. import _core
 from .._errors import BadDataError
+from .._paths import as_bytes
 from .._recording import Recording, read
 
 if TYPE_CHECKING:
@@ -164,10 +165,21 @@ class FileReader:
         """Nothing is open any more."""
 
     def _json(self, name: str) -> Optional[dict[str, Any]]:
-        with ZipFile(self.file_name) as archive:
-            if name not in archive.namelist():
-                return None
-            return json.loads(archive.read(name))
+        text = _core.entry(as_bytes(self.file_name), name)
+        if text is None:
+            return None
+        try:
+            found = json.loads(text)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict):
+            raise BadDataError(
+                "bad_data",
+                f"{name} is no JSON object",
+                os.fsdecode(self.file_name),
+                "read the samples with sixpoint.read()",
+            )
+        return found
 
     @property
     def acceleration(self) -> NDArray[np.float64]:
@@ -220,10 +232,13 @@ def _rows_of_pygt3x(recording: Recording) -> tuple[NDArray[np.bool_], NDArray[np
     asleep = np.zeros(len(recording), dtype=bool)
     if recording.gaps:
         seconds = recording.time.view("int64") // 1_000_000_000
-        for begin, length, kind in recording.gaps_unix():
-            first, last = np.searchsorted(seconds, (begin, begin + length))
+        order = np.argsort(seconds, kind="stable")  # a clock may have been set back
+        for begin, length, kind, filled in recording._gaps:
+            if not filled:
+                continue  # rows of these seconds were recorded, behind a leap of the clock
+            first, last = np.searchsorted(seconds, (begin, begin + length), sorter=order)
             if kind == "idle_sleep":
-                asleep[first:last] = True
+                asleep[order[first:last]] = True
             else:
-                kept[first:last] = False
+                kept[order[first:last]] = False
     return kept, asleep

@@ -12,6 +12,7 @@ read_gt3x_sixpoint <- function(path, verbose = FALSE, asDataFrame = FALSE, imput
     if (is.character(x)) answer_of(list(x))
     names(x) <- c("X", "Y", "Z", "time")
     attributes(x$time) <- list(class = c("POSIXct", "POSIXt"), tzone = "GMT")
+    given$start_time <- start_of(given, x$time)
     attr(x, "row.names") <- .set_row_names(length(x$X))
     class(x) <- c("activity_df", "data.frame")
   } else {
@@ -20,8 +21,8 @@ read_gt3x_sixpoint <- function(path, verbose = FALSE, asDataFrame = FALSE, imput
     x <- both[[1]]
     times <- both[[2]]
     dimnames(x) <- list(NULL, c("X", "Y", "Z"))
-    start <- as.numeric(given$start_time)
-    attr(x, "time_index") <- as.integer(round((times - start) * 100))
+    given$start_time <- start_of(given, times)
+    attr(x, "time_index") <- as.integer(round((times - as.numeric(given$start_time)) * 100))
     class(x) <- c("activity", "matrix", "array")
   }
   for (name in names(given)) {
@@ -39,6 +40,11 @@ time_of_ticks <- function(ticks) {
     return(as.POSIXct(NA, tz = "GMT"))
   }
   as.POSIXct(as.numeric(ticks) / 1e7 - 62135596800, origin = "1970-01-01", tz = "GMT")
+}
+
+# Start Date; where there is none, the time of the first sample.
+start_of <- function(given, times) {
+  if (is.na(given$start_time)) .POSIXct(as.numeric(times[1]), tz = "GMT") else given$start_time
 }
 
 # What read.gt3x's answers carry.
