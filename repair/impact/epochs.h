@@ -52,7 +52,7 @@ struct EpochSeries {
   std::string path;
   int epoch_s = 0;
   double rate_hz = 0;
-  bool has_counts = false;  // false for a rate that the counts do not know
+  bool has_counts = false;    // false for a rate that the counts do not know
   std::vector<Epoch> epochs;  // in order of time
 };
 

@@ -4,9 +4,9 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "repair/made_agdc.h"
 #include "gt3x/rows/sample_stream.h"
 #include "gt3x_made_log.h"
+#include "repair/made_agdc.h"
 #include "repair/made_recording.h"
 
 namespace sixpoint::repair {
