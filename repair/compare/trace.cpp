@@ -42,11 +42,12 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     if (!start) {
       start = item->unix_time;
     }
-    // Steps that it needs before the first: the clock was set back.
-    const std::uint64_t earlier = (std::max(*start, item->unix_time) - item->unix_time) * rate;
-    const std::uint64_t first = (std::max(*start, item->unix_time) - *start) * rate;
+    // It begins before the first step: the clock was set back.
+    const std::uint64_t earlier_s = std::max(*start, item->unix_time) - item->unix_time;
+    std::uint64_t first = (std::max(*start, item->unix_time) - *start) * rate;
     const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
-    if (std::max(earlier + trace.magnitude_g_.size(), first + count) > kMaxTraceSamples) {
+    const std::uint64_t size = trace.magnitude_g_.size();
+    if (std::max(earlier_s * rate + size, first + count) > kMaxTraceSamples) {
       return fail(ErrorCode::bad_data,
                   fmt::format("the recording, from its earliest sample to its latest, is longer "
                               "than {} samples",
@@ -54,9 +55,13 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
                   path,
                   "compare recordings of hours, not of weeks; inspect says where its clock leaps");
     }
-    if (earlier > 0) {
-      trace.magnitude_g_.insert(trace.magnitude_g_.begin(), earlier, kMissing);
-      start = item->unix_time;
+    if (earlier_s > 0) {
+      // With room for as much again: it may be set back second by second.
+      const std::uint64_t spare_s = std::min<std::uint64_t>(
+          {item->unix_time, size / rate, (kMaxTraceSamples - size) / rate - earlier_s});
+      trace.magnitude_g_.insert(trace.magnitude_g_.begin(), (spare_s + earlier_s) * rate, kMissing);
+      start = static_cast<std::uint32_t>(item->unix_time - spare_s);
+      first = spare_s * rate;
     }
     if (trace.magnitude_g_.size() < first + count) {  // not where the clock leapt back
       trace.magnitude_g_.resize(first + count, kMissing);
@@ -74,7 +79,14 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     return fail(ErrorCode::bad_data, "the recording holds no samples", path,
                 "check that the unit was started; download the recording again");
   }
-  trace.start_s_ = *start;
+  const auto recorded = std::ranges::find_if_not(
+      trace.magnitude_g_, [](float magnitude_g) { return std::isnan(magnitude_g); });
+  const std::uint64_t spare_s =
+      static_cast<std::uint64_t>(recorded - trace.magnitude_g_.begin()) / rate;
+  trace.magnitude_g_.erase(
+      trace.magnitude_g_.begin(),
+      trace.magnitude_g_.begin() + static_cast<std::ptrdiff_t>(spare_s * rate));
+  trace.start_s_ = static_cast<double>(*start) + static_cast<double>(spare_s);
   return trace;
 }
 

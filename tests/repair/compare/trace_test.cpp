@@ -102,6 +102,20 @@ TEST(Trace, NoSampleIsLostBeforeTheFirst) {
   }
 }
 
+// Room before the first step is made for more than is needed, and given back.
+TEST(Trace, AClockThatIsSetBackAgainAndAgainBeginsWhereItsEarliestSampleIs) {
+  for (const std::uint32_t earliest : {100U, 3U, 0U}) {
+    const auto trace = loaded({200, 201, 150, 149, 148, 147, earliest, 210});
+    ASSERT_OK(trace);
+    EXPECT_EQ(trace->start_s(), gt3x::tests::kStart + earliest);
+    ASSERT_EQ(trace->size(), (211 - earliest) * 30);
+    for (const std::uint32_t second : {200U, 201U, 150U, 149U, 148U, 147U, earliest, 210U}) {
+      EXPECT_FALSE(std::isnan(trace->magnitude_g(30 * (second - earliest)))) << second;
+    }
+    EXPECT_TRUE(std::isnan(trace->magnitude_g(30 * (202 - earliest))));
+  }
+}
+
 // Years are no reason to hold a step for each of their samples.
 TEST(Trace, AClockThatIsSetBackByYearsIsRefused) {
   constexpr std::uint32_t kTenYears_s = 10U * 365 * 86'400;
