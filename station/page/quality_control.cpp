@@ -150,7 +150,7 @@ Result<Json> QualityControl::statistics(const StatisticsQuery& query) {
                              {"next_action", known->next_action}};
     }
   }
-  std::vector<std::string> names;
+  std::vector<std::string> names = report.limits_differ;
   for (const auto& [name, capability] : report.capabilities) {
     names.push_back(name);
   }

@@ -759,6 +759,13 @@ const scenarios = {
     await h.shot(page, 'statistics-1');
     await page.getByLabel('Before').fill('2001-01-01');
     await page.getByText('No runs were stored yet.').waitFor();
+    // A unit that was judged by other limits: there is no one Cpk.
+    const wide = join(home, 'wide.toml');
+    writeFileSync(wide, '[zero_offset_mg]\nlow = -2000\nhigh = 2000\n');
+    jig('--device', 'virtual:seed=12,jig=auto', '--operator', 'Ada', '--limits', wide);
+    await page.getByLabel('Before').fill('');
+    await page.getByText('No Cpk, for units were judged by different limits: Zero offset x, mg').waitFor();
+    check(await page.getByRole('row', { name: /^Zero offset x, mg/ }).count() === 0, 'and no row of the table');
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 

@@ -254,6 +254,7 @@ export const EN = {
     capability: 'Capability',
     quantity: 'Quantity', n: 'Units', meanOf: 'Mean', sd: 'SD', cp: 'Cp', cpk: 'Cpk (95 % interval)',
     noCapability: 'Too few units for capability.',
+    limitsDiffer: (names: string[]) => `No Cpk, for units were judged by different limits: ${names.join('; ')}.`,
     quantityTitle: (t: Title) => `${t.title}${t.axis ? ` ${t.axis}` : ''}${t.unit ? `, ${t.unit}` : ''}`,
     gage: 'Gage study (R&R)',
     gageNone: 'The store has no gage study. Measure one with: sixpoint jig --study NAME --operator WHO',

@@ -250,6 +250,7 @@ export const DE: Strings = {
     capability: 'Prozessfähigkeit',
     quantity: 'Größe', n: 'Geräte', meanOf: 'Mittel', sd: 'Standardabweichung', cp: 'Cp', cpk: 'Cpk (95-%-Intervall)',
     noCapability: 'Zu wenige Geräte für die Prozessfähigkeit.',
+    limitsDiffer: (names) => `Kein Cpk, denn Geräte wurden nach verschiedenen Grenzen beurteilt: ${names.join('; ')}.`,
     quantityTitle: (t: Title) => `${t.title}${t.axis ? ` ${t.axis}` : ''}${t.unit ? `, ${t.unit}` : ''}`,
     gage: 'Messsystemanalyse (R&R)',
     gageNone: 'Der Speicher hat keine Messsystemanalyse. Eine messen: sixpoint jig --study NAME --operator WER',

@@ -43,18 +43,20 @@ function Codes({ view }: { view: StatisticsView }) {
 
 function Capabilities({ view }: { view: StatisticsView }) {
   const rows = Object.entries(view.capability);
-  if (!rows.length) return <p>{T.noCapability}</p>;
+  const title = (name: string) => (view.titles[name] ? T.quantityTitle(view.titles[name]) : name);
+  const differ = view.limits_differ.length > 0 && <p>{T.limitsDiffer(view.limits_differ.map(title))}</p>;
+  if (!rows.length) return differ || <p>{T.noCapability}</p>;
   return (
-    <div class="table"><table>
+    <><div class="table"><table>
       <thead><tr>{[T.quantity, T.n, T.meanOf, T.sd, T.cp, T.cpk].map((each) => <th scope="col">{each}</th>)}</tr></thead>
       <tbody>{rows.map(([name, one]) => (
         <tr>
-          <th scope="row">{view.titles[name] ? T.quantityTitle(view.titles[name]) : name}</th>
+          <th scope="row">{title(name)}</th>
           <td>{one.n}</td><td>{figure(one.mean)}</td><td>{figure(one.sd)}</td><td>{one.cp === null ? '–' : index(one.cp)}</td>
           <td><b>{index(one.cpk)}</b> <small>{index(one.cpk_interval[0])} – {index(one.cpk_interval[1])}</small></td>
         </tr>
       ))}</tbody>
-    </table></div>
+    </table></div>{differ}</>
   );
 }
 

@@ -62,7 +62,8 @@ export interface Capability {
   n: number; mean: number; sd: number; cp: number | null; cpk: number; cpk_interval: [number, number];
 }
 export interface StatisticsView {
-  by: string; all: Group; groups: Group[]; capability: Record<string, Capability>; titles: Record<string, Title>;
+  by: string; all: Group; groups: Group[]; capability: Record<string, Capability>; limits_differ: string[];
+  titles: Record<string, Title>;
   codes: Record<string, { meaning: string; cause: string; next_action: string }>;
 }
 export interface Studies { studies: string[]; quantities: (Title & { axes: string[] })[] }
