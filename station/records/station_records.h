@@ -53,8 +53,8 @@ struct CheckUnitChart {
 // | failed with just its codes              | open                                                |
 // | passed, or other codes, or no verdict   | locked until it fails as it must                    |
 //
-// A signature opens none of these. A unit that was removed, or named again without codes, lifts no
-// lock that it set before: that stays until an engineer signs. Afterwards it sets none.
+// A signature opens none of these. A unit that was removed, or named again without codes, need not
+// be measured any more; but where its last run before that locks the station, an engineer signs.
 inline constexpr std::chrono::hours kShift{12};
 struct KnownBad {
   std::string serial;

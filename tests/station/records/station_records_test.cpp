@@ -109,6 +109,11 @@ TEST_F(StationRecords, AKnownBadUnitThatCeasesLiftsNoLock) {
     return station_state(store_, "A", default_limits().check_unit, env_.clock.now()).value();
   };
   for (const char* ceases : {"check_unit_end", "check_unit"}) {
+    env_.clock.set(env_.clock.now() + kShift + std::chrono::hours(1));
+    name_known_bad("BAD1");
+    EXPECT_TRUE(state().locked) << "not measured in this shift";
+    decide(ceases, "BAD1");
+    EXPECT_FALSE(state().locked) << "and need not be any more";
     name_known_bad("BAD1");
     add_run("BAD1", JigVerdict::fail);  // with zero_high
     decide(ceases, "BAD1");
