@@ -112,6 +112,12 @@ bool JigRun::is_stuck(const device::RawCounts& counts) {
   return false;
 }
 
+// A turn takes longer, and changes every axis that works.
+bool JigRun::may_be_stuck() const {
+  constexpr double kTurn_s = 2;
+  return std::ranges::max(window_.repeats()) > static_cast<int>(kTurn_s * options_.rate_hz);
+}
+
 std::optional<calib::Calibration> JigRun::constants_of_faces() const {
   if (progress_.faces.empty()) {
     return std::nullopt;
@@ -389,7 +395,8 @@ void JigRun::on_settled() {
     return;
   }
   if (const std::string reason = why_not_wanted(face.pose); !reason.empty()) {
-    refuse(face.pose, reason, JigAction::Refusal::unwanted);
+    refuse(face.pose, reason,
+           may_be_stuck() ? JigAction::Refusal::other : JigAction::Refusal::unwanted);
     return;
   }
   dwell_.clear();

@@ -187,7 +187,7 @@ struct JigAction {
     finished,
   };
   enum class Refusal {
-    other,     // it moved, lies between two faces, is too noisy
+    other,     // it moved, lies between two faces, is too noisy; or an axis may be stuck
     unwanted,  // it lies on the face `pose`, which is not wanted
     tilted,    // it lies on the face `pose`, tilted
   };
@@ -297,6 +297,7 @@ class JigRun {
   double to_g(double lsb, std::size_t axis) const;
   double to_mg(double lsb, std::size_t axis) const;
   bool is_stuck(const device::RawCounts& counts);
+  bool may_be_stuck() const;  // too early to say
   bool is_still() const;
   bool has_moved(const PerAxis<double>& from_lsb, double limit_mg) const;
   NearestFace recognise(const PerAxis<double>& mean_lsb) const;

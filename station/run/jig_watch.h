@@ -46,7 +46,8 @@ class JigWatch {
   // | this pose                             | tilted, the first ones | success                  |
   // | this pose                             | tilted again and again | bad_data                 |
   // | any                                   | moved, between faces,  | success: they say nothing|
-  // |                                       | too noisy              | about the pose           |
+  // |                                       | too noisy, or an axis  | about the pose           |
+  // |                                       | may be stuck           |                          |
   Status compare(device::Jig& jig, const JigAction& action);
 
  private:
