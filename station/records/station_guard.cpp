@@ -21,8 +21,8 @@ constexpr const char* kName = "/memory.json";
 constexpr std::uint64_t kMostMemory_bytes = 16U << 20U;
 constexpr std::size_t kMostNames = 64;
 constexpr std::size_t kMostWaiting = 64;  // runs of one unit
-// Ten seconds: the store is asked while it is held.
-constexpr int kLockAttempts = 500;
+// A minute: the store is asked while it is held, and one that is silent is given up after ten seconds.
+constexpr int kLockAttempts = 3000;
 constexpr std::chrono::milliseconds kLockPause{20};
 
 bool contains(const std::vector<std::string>& list, const std::string& text) {
