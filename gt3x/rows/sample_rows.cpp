@@ -13,17 +13,6 @@ namespace {
 
 constexpr std::uint64_t kLongestFill_s = 400ULL * 86'400;
 
-Result<std::optional<AgdcCalibration>> agdc_calibration_of(Recording& recording, double rate_hz) {
-  if (!recording.has_entry("calibration.json")) {
-    return std::nullopt;
-  }
-  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
-  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1 << 20));
-  const auto parsed = parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
-  // Not every calibration.json is one of these; who needs it will say that it is missing.
-  return parsed ? std::optional(*parsed) : std::nullopt;
-}
-
 }  // namespace
 
 // Rows for the seconds of a recording, one after the other.
@@ -113,11 +102,7 @@ class RowSource::Rows {
       return {};
     }
     const auto scale = accel_scale_lsb_per_g(info_, item.parameters);
-    // 12 bits at 16 LSB/g would be 128 g: what an .agdc says of raw counts (1) is no scale.
-    constexpr double kLeastOfCalibrated_lsb_per_g = 16;
-    const bool no_scale =
-        item.type == RecordType::activity3 && scale && *scale < kLeastOfCalibrated_lsb_per_g;
-    if (!scale || *scale < 1 || *scale > 65536 || no_scale) {
+    if (!scale || *scale < 1 || *scale > 65536) {
       return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", {},
                   "export the stored counts with --raw");
     }
@@ -183,7 +168,9 @@ class RowSource::Rows {
 
 Result<RowSource> RowSource::open(Recording& recording, const RawCsvOptions& options) {
   SIXPOINT_ASSIGN(const double rate_hz, usable_sample_rate_hz(recording.info(), recording.path()));
-  SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
+  // Not every calibration.json is one of an .agdc; who needs it says that it is missing.
+  const auto found = agdc_calibration(recording, rate_hz);
+  const auto agdc = found ? std::optional(*found) : std::nullopt;
   return RowSource(std::make_unique<Rows>(recording, options, rate_hz, agdc));
 }
 
