@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "base/text/json_text.h"
 
 namespace sixpoint::db {
 namespace {
@@ -114,15 +115,8 @@ Result<std::pair<std::string, Bytes>> attachment_from_json(const Json& json) {
 }
 
 Result<Json> parse_json_line(std::string_view text) {
-  bool too_deep = false;
-  Json json = Json::parse(
-      text,
-      [&](int depth, Json::parse_event_t /*event*/, Json& /*parsed*/) {
-        too_deep = too_deep || depth > 4;
-        return depth <= 4;
-      },
-      false);
-  if (json.is_discarded() || !json.is_object() || too_deep) {
+  auto json = parse_json<Json>(text);
+  if (!json.is_object()) {
     return fail(ErrorCode::bad_data, "the line is no JSON object of an export", {}, "export again");
   }
   return json;

@@ -1,5 +1,7 @@
 #include "db/export_json.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "base/sha256.h"
@@ -69,7 +71,11 @@ TEST(ExportJson, TheFirstLineNamesFormatAndVersion) {
 
 TEST(ExportJson, ALineIsAnObjectAndNotDeep) {
   EXPECT_OK(parse_json_line(R"({"a":{"b":{"c":1}}})"));
-  for (const char* bad : {"", "[1]", "{", R"({"a":{"b":{"c":{"d":{"e":1}}}}})"}) {
+  std::string deep = "1";
+  for (int level = 0; level < 101; ++level) {
+    deep = R"({"a":)" + deep + "}";
+  }
+  for (const std::string& bad : {std::string(), std::string("[1]"), std::string("{"), deep}) {
     EXPECT_FAILS(parse_json_line(bad), ErrorCode::bad_data);
   }
 }
