@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace sixpoint::gap {
 namespace {
@@ -35,6 +36,21 @@ class Conditions {
 Eigen::Vector3d white_mg2(const NoiseSpectrum& noise) {
   return {std::pow(noise.white_mg[0], 2), std::pow(noise.white_mg[1], 2),
           std::pow(noise.white_mg[2], 2)};
+}
+
+// Standard deviation of one sample before it is stored: over the whole spectrum, which a low-pass
+// narrows, less what storing adds.
+Eigen::Vector3d sample_noise_mg(const NoiseSpectrum& noise, double lsb_mg) {
+  Eigen::Vector3d sd_mg = Eigen::Vector3d::Zero();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& mg2 = noise.variance_mg2[static_cast<std::size_t>(axis)];
+    if (!mg2.empty()) {
+      const double stored_mg2 =
+          std::accumulate(mg2.begin(), mg2.end(), 0.0) / static_cast<double>(mg2.size());
+      sd_mg[axis] = std::sqrt(std::max(0.0, stored_mg2 - lsb_mg * lsb_mg / 12));
+    }
+  }
+  return sd_mg;
 }
 
 bool gives_block(const ToneFit& tone) {
@@ -135,6 +151,9 @@ void add_dwell(Block block, const Bundle& bundle, const CleanSamples& clean,
   }
   const double mg_per_lsb = 1000 / bundle.accel_scale_lsb_per_g;
   block.value_mg = sum / n * mg_per_lsb;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    block.truncated_mg[axis] = truncated_mg(block.value_mg[axis], block.noise_mg[axis], mg_per_lsb);
+  }
   block.white_mg2 = Eigen::Vector3d(white_mg2(noise) / n).asDiagonal();
   block.seconds = n / bundle.rate_hz;
   block.middle_s = segment.host_start_s + index / n / bundle.rate_hz;
@@ -177,6 +196,7 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
                                const NoiseSpectrum& noise, const std::vector<ToneFit>& tones,
                                const Response& response) {
   std::vector<Block> blocks;
+  const Eigen::Vector3d noise_mg = sample_noise_mg(noise, 1000 / bundle.accel_scale_lsb_per_g);
   Conditions conditions;
   std::size_t tone_at = 0;
   int session = 0;
@@ -191,7 +211,7 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
     block.rotation = segment.rotation;
     block.approach_g = segment.approach_g;
     block.held_sign = segment.held_sign;
-    block.noise_mg = white_mg2(noise).cwiseSqrt();
+    block.noise_mg = noise_mg;
     if (!segment.vibration) {
       add_dwells(block, bundle, clean, noise, conditions, blocks);
     } else if (const ToneFit& tone = tones[tone_at++]; gives_block(tone)) {

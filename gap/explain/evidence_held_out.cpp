@@ -81,20 +81,25 @@ double Explanation::held_out_nats(const std::string& effect) const {
   return gain;
 }
 
-std::vector<bool> Explanation::columns_of(const std::set<std::string>& named) const {
-  std::vector<bool> counts(kNuisanceParameters, true);
+Explanation::Named Explanation::of_named(const std::set<std::string>& named) const {
+  Named out;
+  out.counts.assign(kNuisanceParameters, true);
   for (const int g : best().subset.groups) {
+    if (named.count(model_.group(g).effect) == 0) {
+      continue;
+    }
+    out.groups.push_back(g);
     for (int i = 0; i < model_.group(g).count; ++i) {
-      counts.push_back(i < 3 && named.count(model_.group(g).effect) != 0);
+      out.counts.push_back(i < 3);
     }
   }
-  return counts;
+  return out;
 }
 
 std::vector<double> Explanation::left_over_sigma(const std::set<std::string>& named) const {
-  const std::vector<bool> counts = columns_of(named);
+  const auto [groups, counts] = of_named(named);
   const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
-  const Posterior fitted = model_.solve(w.sums, best().subset.groups).posterior();
+  const Posterior fitted = model_.solve(w.sums, groups).posterior();
   Eigen::VectorXd left_mg = linear_.col(model_.columns());
   for (std::size_t c = 0; c < counts.size(); ++c) {
     if (counts[c]) {
@@ -125,7 +130,7 @@ std::vector<double> Explanation::left_over_sigma(const std::set<std::string>& na
 
 Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) const {
   HeldOut out;
-  const std::vector<bool> counts = columns_of(named);
+  const auto [groups, counts] = of_named(named);
   if (model_.rows() == 0) {
     return out;
   }
@@ -138,7 +143,7 @@ Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) c
       continue;
     }
     const Posterior nothing = model_.solve(left.others, {}).posterior();
-    Posterior accepted = model_.solve(left.others, best().subset.groups).posterior();
+    Posterior accepted = model_.solve(left.others, groups).posterior();
     for (std::size_t c = 0; c < counts.size(); ++c) {
       accepted.mean[static_cast<Eigen::Index>(c)] *= counts[c] ? 1 : 0;
     }

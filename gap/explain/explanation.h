@@ -117,8 +117,8 @@ class Explanation {
     double mean_before_sigma = 0, mean_after_sigma = 0;
     int rows = 0;
   };
-  // `named`: effects that count as explained; of others, and of what bends an effect from its plain
-  // law, the estimates are taken out, as a simulation with the named effects would leave them out.
+  // `named`: effects that count as explained; others are not fitted, and of what bends an effect from
+  // its plain law the estimates are taken out, as a simulation with the named effects would have it.
   HeldOut held_out(const std::set<std::string>& named) const;
   // Per row: what the named effects leave, all conditions fitted, in standard deviations of noise,
   // nominal seating and named scatter.
@@ -139,8 +139,13 @@ class Explanation {
   Information information(int g, std::vector<int> others) const;
   // Of group `g` among `groups`, all with their widest priors.
   Estimate estimate_of(int g, std::vector<int> groups) const;
-  // Per column of the best explanation: whether a simulation with the named effects has it.
-  std::vector<bool> columns_of(const std::set<std::string>& named) const;
+  // Of the best explanation what a simulation with the named effects has: their groups, and for each
+  // column of a solution with these whether it counts.
+  struct Named {
+    std::vector<int> groups;
+    std::vector<bool> counts;
+  };
+  Named of_named(const std::set<std::string>& named) const;
   // What one kind of scatter explains.
   struct Trial {
     std::optional<Fit> fit;

@@ -240,6 +240,19 @@ void set_ripples(std::vector<Block>& blocks) {
   }
 }
 
+double truncated_mg(double stored_mg, double noise_mg, double lsb_mg) {
+  constexpr double kOneMean_lsb = 0.4;  // with less noise several means are stored alike
+  const double sigma = std::max(kOneMean_lsb * lsb_mg, noise_mg);
+  double least = 0;  // halved, until no double is between
+  double most = lsb_mg / 2;
+  const double stored = std::abs(stored_mg);
+  for (int halving = 0; halving < 50; ++halving) {
+    const double taken = (least + most) / 2;
+    (taken < lsb_mg / 2 * std::erf((stored + taken) / (sigma * M_SQRT2)) ? least : most) = taken;
+  }
+  return std::copysign(least, stored_mg);
+}
+
 Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg) {
   const Eigen::Matrix3d tilt = turn(Eigen::Vector3d(s.tilt_deg[0], s.tilt_deg[1], 0));
   Eigen::Matrix3d cross;
@@ -274,11 +287,11 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
   for (Eigen::Index a = 0; a < 3; ++a) {
-    const double sigma = std::max(kLeastNoise_lsb * lsb_mg, block.noise_mg[a]);
     if (!block.tone) {
-      out[a] = stored_mg(sensed_mg(a, rest[a]), sigma);
+      out[a] = sensed_mg(a, rest[a]) - s.truncation * block.truncated_mg[a];
       continue;
     }
+    const double sigma = std::max(kLeastNoise_lsb * lsb_mg, block.noise_mg[a]);
     const double filter = block.filter_gain;
     const double level_mg = mean_mg(a);
     const int phases =

@@ -130,11 +130,18 @@ struct Block {
   double filter_gain = 1;                                     // of the low-pass behind the sensor
   bool harmonics = false;                                     // 8 features instead of 6
   Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation
+  // Of a dwell: what truncation would have taken from its means, truncated_mg(). By what was measured,
+  // not by what is predicted: a slow noise that no prediction has may carry a mean through zero.
+  Eigen::Vector3d truncated_mg = Eigen::Vector3d::Zero();
 
   Eigen::VectorXd value_mg;   // 3, 6 or 8: mean XYZ, in phase XYZ, second and third harmonic
   Eigen::MatrixXd white_mg2;  // covariance of the noise
   Eigen::Index size() const { return value_mg.size(); }
 };
+
+// What truncation toward zero takes from a mean that is stored as `stored_mg`, where Gaussian noise of
+// this standard deviation is on it: the mean y is stored as y - lsb / 2 erf(y / (noise sqrt(2))).
+double truncated_mg(double stored_mg, double noise_mg, double lsb_mg);
 
 // Block::ripple_h of all blocks of a recording, from their times.
 void set_ripples(std::vector<Block>& blocks);

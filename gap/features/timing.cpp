@@ -72,21 +72,31 @@ CoarseRate rate_on_circle(const std::vector<Stamps>& segments, double interval_s
           pairs > 0 && std::abs(sum) / pairs < kJitteryShare * uniform - 2 / std::sqrt(2 * pairs)};
 }
 
-// Slips in whole samples before each stamp, positive where samples were lost. A median of three: a
-// late stamp comes and goes, a slip stays.
-std::vector<double> clear_slips(const Stamps& stamps, double slope, double interval_s) {
-  std::vector<double> level(stamps.size());
-  for (std::size_t i = 0; i < stamps.size(); ++i) {
-    level[i] = stamps[i].residual_s;
-    if (i > 0 && i + 1 < stamps.size()) {
-      const auto [low, high] = std::minmax(stamps[i - 1].residual_s, stamps[i + 1].residual_s);
-      level[i] = std::clamp(level[i], low, high);
-    }
+// Residuals less those of a clock of this rate.
+std::vector<double> levels(const Stamps& stamps, double slope) {
+  std::vector<double> level;
+  level.reserve(stamps.size());
+  for (const Stamp& s : stamps) {
+    level.push_back(s.residual_s - slope * s.nominal_s);
   }
-  std::vector<double> slips(stamps.size(), 0);
-  for (std::size_t i = 1; i < stamps.size(); ++i) {
-    const double dt = stamps[i].nominal_s - stamps[i - 1].nominal_s;
-    slips[i] = std::round((level[i] - level[i - 1] - slope * dt) / interval_s);
+  return level;
+}
+
+// Slips in whole samples before each stamp, positive where samples were lost. A median of three: a
+// late stamp comes and goes, a slip stays. The clock's rate is off the levels before: with it the
+// median would cut what a slip is against the clock.
+std::vector<double> clear_slips(const Stamps& stamps, double slope, double interval_s) {
+  const std::vector<double> level = levels(stamps, slope);
+  const auto median = [&](std::size_t i) {
+    if (i == 0 || i + 1 == level.size()) {
+      return level[i];
+    }
+    const auto [low, high] = std::minmax(level[i - 1], level[i + 1]);
+    return std::clamp(level[i], low, high);
+  };
+  std::vector<double> slips(level.size(), 0);
+  for (std::size_t i = 1; i < level.size(); ++i) {
+    slips[i] = std::round((median(i) - median(i - 1)) / interval_s);
   }
   return slips;
 }
@@ -112,10 +122,10 @@ double step_at(std::span<const double> level, std::size_t at) {
 class JitterySlips {
  public:
   JitterySlips(const Stamps& stamps, double slope, double interval_s)
-      : interval_s_(interval_s), steps_(stamps.size(), 0), slips_(stamps.size(), 0) {
-    for (const Stamp& s : stamps) {
-      level_.push_back(s.residual_s - slope * s.nominal_s);
-    }
+      : interval_s_(interval_s),
+        level_(levels(stamps, slope)),
+        steps_(stamps.size(), 0),
+        slips_(stamps.size(), 0) {
     look(level_, 0, 0, level_.size());
   }
 
@@ -199,11 +209,14 @@ void take_out_slips(std::vector<Stamps>& segments, double interval_s, HostTiming
       count_slips(segments, other, interval_s) < count_slips(segments, rate, interval_s)) {
     rate = other;
   }
+  // By the host: where a clock is 4000 ppm off and slips every other second at 100 Hz, nominal
+  // intervals leave 20 ppm.
+  const double host_interval_s = interval_s * (1 + rate.slope);
   for (Stamps& stamps : segments) {
     const std::vector<double> slips = slips_of(stamps, rate, interval_s);
     double shift_s = 0;
     for (std::size_t i = 1; i < stamps.size(); ++i) {
-      shift_s += slips[i] * interval_s;
+      shift_s += slips[i] * host_interval_s;
       stamps[i].residual_s -= shift_s;
       const int lost = static_cast<int>(std::clamp(slips[i], -kMostSlip, kMostSlip));
       (lost > 0 ? timing.lost : timing.repeated) += static_cast<std::size_t>(std::abs(lost));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "gap/recording/median.h"
 
@@ -240,26 +241,29 @@ ToneGuess guess_tone(const DrivenAxis& driven, const CleanSamples& clean, std::s
 // A number that overflowed lies 4096 away from where its known tone has it. Only where the protocol
 // drives the axis near or beyond full scale.
 void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
-  constexpr double kNearFullScale = 0.75 * kFullScaleHigh;
+  constexpr double kNearFullScale = 0.9 * kFullScaleHigh;  // gains and zeros are off by less
   constexpr std::size_t kPiece = 50;  // short enough that a slip of the clock spoils few pieces
-  // How far off a piece may be: a sixteenth of a turn. A unit that clips has samples at its limit;
-  // where there are none, times that scatter may bring a tone this far off (2 ms at 19 Hz and 11
+  // How far off a piece may be: times that scatter bring a tone this far off (2 ms at 19 Hz and 11
   // g).
-  constexpr double kKnown_lsb = 250, kJitters_lsb = 600;
-  constexpr std::ptrdiff_t kClips = 3;
+  constexpr double kJitters_lsb = 600;
+  // A unit that clips does not overflow: near half of such a dwell stands at its limits. Of numbers
+  // that overflow one in a thousand does.
+  constexpr std::size_t kClips = 50;  // one sample of so many
   for (const DrivenAxis& driven : driven_axes(bundle)) {
     if (driven.peak_lsb() < kNearFullScale) {
       continue;
     }
     const std::size_t n = driven.segment->samples;
+    const std::span dwell(clean.samples.data() + driven.segment->first_sample, n);
+    const auto at_limit = std::ranges::count_if(dwell, [&](const gt3x::Counts& counts) {
+      return std::abs(counts[driven.axis]) >= kFullScaleHigh;
+    });
+    if (kClips * static_cast<std::size_t>(at_limit) > n) {
+      continue;
+    }
     for (std::size_t first = 0; first + kPiece <= n; first += kPiece) {
       const ToneGuess tone = guess_tone(driven, clean, first, first + kPiece);
-      const auto begin =
-          clean.samples.begin() + static_cast<std::ptrdiff_t>(driven.segment->first_sample + first);
-      const bool clips = std::count_if(begin, begin + kPiece, [&](const gt3x::Counts& counts) {
-                           return std::abs(counts[driven.axis]) >= kFullScaleHigh;
-                         }) >= kClips;
-      if (tone.rms_lsb > (clips ? kKnown_lsb : kJitters_lsb)) {
+      if (tone.rms_lsb > kJitters_lsb) {
         continue;
       }
       const std::size_t last = first + 2 * kPiece > n ? n : first + kPiece;
@@ -279,22 +283,38 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
 
 constexpr double kDriven_g = 2;  // convention: the catalogue's saturation begins at 5 g
 
+// Whether a plateau can be told from the crest of the tone. A tone that repeats after a few samples
+// (20 Hz at 100 Hz: five) has one of them at its crest, so that all of its crest is one value.
+bool crest_is_spread(const Segment& segment, double rate_hz) {
+  constexpr int kFewPhases = 50;    // 6 g of so many: neighbours of the crest 12 LSB below it
+  constexpr double kWanders = 0.5;  // of the distance between two phases, over the dwell
+  const double cycles = segment.vibration->frequency_hz / rate_hz;
+  for (int samples = 1; samples < kFewPhases; ++samples) {
+    if (std::abs(std::remainder(samples * cycles, 1)) * static_cast<double>(segment.samples) <
+        kWanders) {
+      return false;
+    }
+  }
+  return true;
+}
+
 double driven_g(const Bundle& bundle) {
   double most_lsb = 0;
   for (const DrivenAxis& driven : driven_axes(bundle)) {
-    if (std::abs(driven.amplitude_lsb) >= kDriven_g * bundle.accel_scale_lsb_per_g) {
+    if (std::abs(driven.amplitude_lsb) >= kDriven_g * bundle.accel_scale_lsb_per_g &&
+        crest_is_spread(*driven.segment, bundle.rate_hz)) {
       most_lsb = std::max(most_lsb, std::min<double>(driven.peak_lsb(), kFullScaleHigh));
     }
   }
   return most_lsb / bundle.accel_scale_lsb_per_g;
 }
 
-// Counts of one axis in the vibrations that drive it by so much; empty where none does.
+// Counts of one axis in the vibrations that drive it by so much and show it; empty where none does.
 std::vector<std::size_t> driven_histogram(const Bundle& bundle, const CleanSamples& clean,
                                           std::size_t axis) {
   std::vector<std::size_t> histogram;
   for (const Segment& segment : bundle.segments) {
-    if (!segment.vibration) {
+    if (!segment.vibration || !crest_is_spread(segment, bundle.rate_hz)) {
       continue;
     }
     const Eigen::Vector3d along = segment.rotation * segment.vibration->direction_lab;

@@ -1,5 +1,8 @@
 #include "gap/explain/blocks.h"
 
+#include <cmath>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "gap/made_bundle.h"
@@ -33,6 +36,30 @@ TEST(Blocks, DwellsHaveTheMeanOfTheirSamples) {
   }
   EXPECT_EQ(blocks[5].session, 0);
   EXPECT_EQ(blocks[6].session, 1);
+}
+
+// Of noise of 4 LSB, of which each sample is the mean of two neighbours: its density at low frequencies is
+// that of 4 LSB, and a sample scatters by 4 / sqrt(2).
+TEST(Blocks, TheNoiseOfASampleIsThatBehindTheFilter) {
+  Bundle bundle = tests::made_production({});
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> noise_lsb(0, 4);
+  double before = 0;
+  for (gt3x::Counts& counts : bundle.samples) {
+    const double now = noise_lsb(random);
+    for (std::int16_t& count : counts) {
+      count = static_cast<std::int16_t>(std::lround(count + (before + now) / 2));
+    }
+    before = now;
+  }
+  const CleanSamples clean = clean_samples(bundle);
+  const std::vector<Block> blocks = blocks_of(bundle, clean);
+  const double lsb_mg = 1000 / 256.0;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    // Beside it the unit's own noise, and the first rounding.
+    const double own_mg = std::hypot(1000 * tests::MadeUnit().noise_g[a], lsb_mg / std::sqrt(12));
+    EXPECT_NEAR(blocks[0].noise_mg[a], std::hypot(own_mg, 4 / M_SQRT2 * lsb_mg), 0.3);
+  }
 }
 
 TEST(Blocks, MaskedSamplesAreLeftOut) {

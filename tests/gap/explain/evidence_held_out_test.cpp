@@ -25,6 +25,19 @@ TEST(EvidenceHeldOut, HeldOutFloorInClosedForm) {
   EXPECT_EQ(held.tone_before_sigma, 0) << "no tones";
 }
 
+// What is found and not named is not fitted: it would leave its share in gains and offsets.
+TEST(EvidenceHeldOut, OnlyWhatIsNamedIsFitted) {
+  const Eigen::Vector3d drift_mg_per_h(9, -6, 7);
+  const auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift_mg_per_h; }, 5,
+      120);
+  const Explanation explanation(blocks, only({"drift"}));
+  ASSERT_TRUE(explanation.best().contains("drift"));
+  const Explanation::HeldOut held = explanation.held_out({});
+  EXPECT_NEAR(held.after_mg, held.before_mg, 1e-9);
+  EXPECT_LT(explanation.held_out({"drift"}).after_mg, held.before_mg / 2);
+}
+
 // Rows of one condition, given all others: a conditional Gaussian.
 struct Conditional {
   Eigen::VectorXd residual;

@@ -85,13 +85,19 @@ TEST(Forward, AFilterTakesFromTheToneOnly) {
 }
 
 TEST(Forward, TruncationFollowsTheErrorFunction) {
+  const double taken_mg = kLsb_mg / 2 * std::erf(2 / (4 * M_SQRT2));
+  EXPECT_NEAR(truncated_mg(2 - taken_mg, 4, kLsb_mg), taken_mg, 1e-9);
+  EXPECT_NEAR(truncated_mg(taken_mg - 2, 4, kLsb_mg), -taken_mg, 1e-9);
+  EXPECT_NEAR(truncated_mg(1000, 4, kLsb_mg), kLsb_mg / 2, 1e-9);
+  EXPECT_EQ(truncated_mg(0, 0.1, kLsb_mg), 0);
+
   ForwardState s;
   s.truncation = 1;
   s.offset_mg = {2, 0, 0};
   Block block = dwell(Eigen::Matrix3d::Identity());
-  block.noise_mg = {4, 4, 5};
+  block.truncated_mg = {taken_mg, 0, kLsb_mg / 2};
   const Eigen::VectorXd y = predict(s, block, kLsb_mg);
-  EXPECT_NEAR(y[0], 2 - kLsb_mg / 2 * std::erf(2 / (4 * M_SQRT2)), 1e-9);
+  EXPECT_NEAR(y[0], 2 - taken_mg, 1e-9);
   EXPECT_NEAR(y[2], 1000 - kLsb_mg / 2, 1e-9);
 }
 

@@ -82,6 +82,38 @@ TEST(HostTiming, ManySlipsAmongJitteringStampsAreFound) {
   EXPECT_EQ(timing.repeated, 400U * 2);
 }
 
+// Oracle: the rate and the slips that are put in. Where a clock is far off and slips in two of five
+// seconds, each slip is 10 ms by the unit and less by the host.
+TEST(HostTiming, AFastClockThatSlipsOftenHasItsRate) {
+  constexpr std::size_t kSeconds = 1000;
+  constexpr double kPpm = 3740;
+  for (const int lost : {1, -1}) {
+    Bundle bundle;
+    Segment segment;
+    segment.name = "still";
+    segment.samples = 100 * kSeconds;
+    bundle.segments = {segment};
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> stamp(-0.002, 0.002);
+    double samples = 0;
+    std::size_t slips = 0;
+    for (std::size_t i = 0; i < kSeconds; ++i) {
+      bundle.host_clock.sample_index.push_back(100 * i);
+      if (i % 5 == 1 || i % 5 == 3) {
+        samples += lost;
+        ++slips;
+      }
+      bundle.host_clock.host_time_s.push_back(samples / 100 / (1 + 1e-6 * kPpm) + stamp(random));
+      samples += 100;
+    }
+    const HostTiming timing = host_timing(bundle);
+    EXPECT_NEAR(timing.clock_ppm, kPpm, 4 * timing.clock_sd_ppm);
+    EXPECT_LT(timing.clock_sd_ppm, 1);
+    EXPECT_EQ(lost > 0 ? timing.lost : timing.repeated, slips);
+    EXPECT_EQ(timing.lost + timing.repeated, slips);
+  }
+}
+
 TEST(HostTiming, NothingWithoutStamps) {
   Bundle bundle = tests::made_production({});
   bundle.host_clock = {};

@@ -116,6 +116,52 @@ TEST(Clean, SaturationWrapAndFullScaleAreToldApart) {
   EXPECT_NEAR(highest, 12 * 256, 40);
 }
 
+// 6 g at 20 Hz: of five samples one is at the crest, and all of the crest is one count.
+TEST(Clean, ACrestOfOneSampleIsNoPlateau) {
+  Bundle bundle = with_high_tone(100, false);
+  Segment& tone = bundle.segments.back();
+  tone.vibration = Vibration{Eigen::Vector3d::UnitZ(), 20, 6};
+  for (std::size_t n = 0; n < tone.samples; ++n) {
+    const double z = 1 + 6 * std::cos(2 * M_PI * 0.2 * static_cast<double>(n));
+    bundle.samples[tone.first_sample + n][2] = static_cast<std::int16_t>(std::lround(256 * z));
+  }
+  const CleanSamples clean = clean_samples(bundle);
+  EXPECT_FALSE(clean.saturated);
+  EXPECT_EQ(clean.driven_g, 0) << "the tone can't show one";
+}
+
+// Samples that are lost put a tone out of step, half a turn at 20 Hz and 80 Hz; 6 g reach no limit.
+TEST(Clean, ATonePutOutOfStepDoesNotWrap) {
+  for (std::size_t lost_at = 1; lost_at < 50; ++lost_at) {
+    Bundle bundle = with_high_tone(100, false);
+    bundle.rate_hz = 80;
+    Segment& tone = bundle.segments.back();
+    tone.vibration = Vibration{Eigen::Vector3d::UnitZ(), 20, 6};
+    for (std::size_t n = 0; n < tone.samples; ++n) {
+      const std::size_t slips = n < 100 + lost_at ? 0 : 2;
+      const double z = 1 + 6 * std::cos(2 * M_PI * 0.25 * static_cast<double>(n + slips));
+      bundle.samples[tone.first_sample + n][2] = static_cast<std::int16_t>(std::lround(256 * z));
+    }
+    EXPECT_EQ(clean_samples(bundle).wrapped_samples, 0U) << lost_at;
+  }
+}
+
+// Samples that are lost put a tone out of step; where it clips, nothing came back by 4096.
+TEST(Clean, AUnitThatClipsDoesNotWrap) {
+  for (std::size_t lost_at = 1; lost_at < 50; ++lost_at) {
+    Bundle bundle = with_high_tone(100, false);
+    const Segment& tone = bundle.segments.back();
+    for (std::size_t n = 0; n < tone.samples; ++n) {
+      const std::size_t slips = (n + 50 - lost_at) / 50;
+      const double z = 1 + 11 * std::cos(2 * M_PI * 0.24125 * static_cast<double>(n + slips));
+      const long count = std::clamp(std::lround(256 * z), -2048L, 2047L);
+      bundle.samples[tone.first_sample + n][2] = static_cast<std::int16_t>(count);
+    }
+    bundle.segments.back().vibration->frequency_hz = 24.125;  // 19.3 Hz at 80 Hz
+    EXPECT_EQ(clean_samples(bundle).wrapped_samples, 0U) << lost_at;
+  }
+}
+
 // By hand: 3 and 5 LSB of 250 LSB/g are 12 and 20 mg; the clipped 2000 does not count, the wrapped
 // 7 does.
 TEST(Clean, MeansAreOfUsableSamples) {
