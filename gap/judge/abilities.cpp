@@ -121,7 +121,8 @@ constexpr double kPoorClock_ppm = 10;  // hundreds of ppm would still have shown
 enum class Observable { yes, too_small, no };
 
 Observable observable(const Request& request, unsigned abilities, const Records& records,
-                      const Explanation& explanation, const CatalogueEntry& entry) {
+                      const Explanation& explanation, const Findings& found,
+                      const CatalogueEntry& entry) {
   const std::string name(entry.name);
   const auto unless = [](bool missing) { return missing ? Observable::no : Observable::yes; };
   const bool shaker = (abilities & kShaker) != 0;
@@ -133,6 +134,9 @@ Observable observable(const Request& request, unsigned abilities, const Records&
   }
   if (name == "axis_rotation") {
     return unless(!records.clean.axes_decidable);
+  }
+  if (name == "jitter" && found.bounds.count(name) == 0) {
+    return Observable::no;  // no tone is without lost or repeated samples
   }
   if ((entry.needs & ~abilities) != 0 ||
       (name == "filter_mismatch" && request.options.uncalibrated)) {
@@ -157,7 +161,7 @@ void list_not_observable(const Request& request, const ProtocolKind& kind, const
     if (found.accepted(name) || !request.allowed(name)) {
       continue;
     }
-    const Observable can = observable(request, kind.abilities, records, explanation, entry);
+    const Observable can = observable(request, kind.abilities, records, explanation, found, entry);
     if (can != Observable::yes) {
       const std::string_view segment =
           can == Observable::too_small && !entry.finer.empty() ? entry.finer : entry.segment;

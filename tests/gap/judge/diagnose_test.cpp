@@ -1,8 +1,11 @@
 #include "gap/judge/diagnose.h"
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -348,6 +351,45 @@ TEST(Diagnose, NoTemperatureAndNoHostClockAreBorne) {
     clock = clock || name == "clock_error";
   }
   EXPECT_TRUE(clock);
+}
+
+// 6 g at 19.3 Hz, by hand: the scatter of sample times shows on its slopes, but not beside samples that
+// are lost.
+TEST(Diagnose, JitterIsNotShownWhereEveryToneSlips) {
+  for (const bool slips : {false, true}) {
+    Bundle bundle = tests::made_production({});
+    Segment tone;
+    tone.name = "shaker_high";
+    tone.kind = Segment::Kind::vibration;
+    tone.first_sample = bundle.samples.size();
+    tone.samples = 1000;
+    tone.host_start_s = bundle.segments.back().host_start_s + 16;
+    tone.placement = 99;
+    tone.vibration = Vibration{Eigen::Vector3d::UnitZ(), 19.3, 6};
+    std::mt19937_64 random(2);
+    std::normal_distribution<double> noise_lsb(0, 1);
+    for (std::size_t n = 0; n < tone.samples; ++n) {
+      const std::size_t at = n + (slips && n >= 600 ? 1 : 0);
+      const double z = 1 + 6 * std::cos(2 * M_PI * 0.193 * static_cast<double>(at));
+      gt3x::Counts counts{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        counts[axis] =
+            static_cast<std::int16_t>(std::lround(noise_lsb(random) + (axis == 2 ? 256 * z : 0)));
+      }
+      bundle.samples.push_back(counts);
+      if (n % 100 == 0) {
+        bundle.host_clock.sample_index.push_back(tone.first_sample + n);
+        bundle.host_clock.host_time_s.push_back(tone.host_start_s + static_cast<double>(at) / 100);
+      }
+    }
+    bundle.segments.push_back(tone);
+    const auto d = diagnose(bundle);
+    ASSERT_OK(d);
+    EXPECT_EQ(std::ranges::count(d->not_observable,
+                                 std::pair<std::string, std::string>("jitter", "shaker_high")),
+              slips ? 1 : 0)
+        << d->brief();
+  }
 }
 
 // A zero that moves once is in no catalogue. It must not be named random walk, drift or warming up.
