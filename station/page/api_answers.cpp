@@ -8,7 +8,6 @@
 #include <fmt/ranges.h>
 
 #include "base/error.h"
-
 #include "db/name_rule.h"
 
 namespace sixpoint::station {
@@ -116,11 +115,10 @@ std::optional<ApiAnswer> refused_key(std::string_view route, const Json& body) {
   }
   for (const auto& [key, value] : body.items()) {
     if (std::ranges::find(found->keys, key) == found->keys.end()) {
-      return refusal(400, "bad_request",
-                     fmt::format("'{}' is no key of this request", printable(key, 60)),
-                     found->keys.empty()
-                         ? "it has none"
-                         : fmt::format("its keys are {}", fmt::join(found->keys, ", ")));
+      return refusal(
+          400, "bad_request", fmt::format("'{}' is no key of this request", printable(key, 60)),
+          found->keys.empty() ? "it has none"
+                              : fmt::format("its keys are {}", fmt::join(found->keys, ", ")));
     }
   }
   return std::nullopt;
