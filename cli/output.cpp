@@ -71,6 +71,12 @@ bool belongs_to_database(FileSystem& files, const std::string& path) {
   return false;
 }
 
+// The folder of a run or a capture that goes on (station/lanes/run_folder.h).
+bool is_under_way(FileSystem& files, const std::string& folder) {
+  return has_schema(beginning_of(files, folder + "/run.json"), "unfinished-run") ||
+         has_schema(beginning_of(files, folder + "/capture.json"), "unfinished-capture");
+}
+
 bool belongs_to_record(FileSystem& files, const std::string& path, std::string_view beginning) {
   constexpr std::array<std::string_view, 5> kRecords = {"bundle", "archive-plan", "archive-output",
                                                         "session-journal", "journal-entry"};
@@ -80,7 +86,8 @@ bool belongs_to_record(FileSystem& files, const std::string& path, std::string_v
                      [&](std::string_view name) { return has_schema(beginning, name); }) ||
          (std::find(kOfBundle.begin(), kOfBundle.end(), file_name_of(path)) != kOfBundle.end() &&
           repair::is_bundle(files, folder)) ||
-         repair::is_plan(files, folder) || repair::is_plan(files, folder + "/..");
+         is_under_way(files, folder) || repair::is_plan(files, folder) ||
+         repair::is_plan(files, folder + "/..");
 }
 
 bool is_recording_name(std::string_view path) {
@@ -121,7 +128,8 @@ Result<Placing> placing_of(Target target, bool force, const std::string& path) {
     case Target::database:
       return refused("this is a store or another database", path, kAnotherName);
     case Target::record:
-      return refused("this is a part of a bundle, of a plan or of a journal", path, kAnotherName);
+      return refused("this is a part of a bundle, of a plan, of a journal or of a run under way",
+                     path, kAnotherName);
     case Target::input:
       return refused("this is what the command reads", path, kAnotherName);
     case Target::folder:

@@ -41,7 +41,8 @@ enum class Target : std::uint8_t {
   plain,      // a regular file of no kind below
   recording,  // a zip archive: .gt3x, .agdc, a session too; or named as a recording
   database,   // an SQLite file: a store, an .agd; and the files that SQLite keeps beside it
-  record,     // a file of a bundle, of an archive's plan, of a session's or a store's journal
+  record,     // a file of a bundle, of an archive's plan, of a session's or a store's journal, of a
+              // run or capture that is under way
   input,      // what this command reads
   folder,     // any
   device,     // of characters; standard output

@@ -4,6 +4,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "repair/batch/answers.h"
 #include "repair/report/study_report.h"
 #include "repair/rescale/repair_records.h"
@@ -111,7 +112,7 @@ Status write_study_report(Context& context, FileSystem& files, const std::string
   study.add_thumbnails(context.env.files);
   return write_file(
       files, path,
-      study.html({title, to_iso8601(context.env.clock.now()), station::software_and_build()}));
+      study.html({title, local_time(context.env.clock.now()), station::software_and_build()}));
 }
 
 void print_units(Context& context, const std::vector<repair::UnitNeeds>& units) {

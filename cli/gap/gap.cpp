@@ -114,8 +114,10 @@ Result<Judged> diagnose(const GapCommandOptions& options, Context& context) {
   return answer;
 }
 
-void print_gap(const gap::Diagnosis& d, Context& context) {
-  context.text() << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
+void print_gap(const gap::Diagnosis& d, bool is_run, Context& context) {
+  // The name of a run is "run ID" (station/records/jig_bundle.h).
+  const std::string name = is_run ? d.bundle.substr(0, d.bundle.find(' ') + 1 + 12) : d.bundle;
+  context.text() << fmt::format("{}: {}\n", printable(name), printable(d.brief(), 2000));
   for (const gap::EffectFinding& effect : d.effects) {
     context.text() << fmt::format("  {:<20} p {:.3f}  matters {:.3f}  held out {:+.1f} nats",
                                   effect.name, effect.probability, effect.probability_it_matters,
@@ -179,7 +181,7 @@ Status run_gap(const GapCommandOptions& options, Context& context) {
   context.worsen(exit_code_of(answer.diagnosis));
   SIXPOINT_CHECK(write_reports(options, answer, outputs.files()));
   if (!options.json) {
-    print_gap(answer.diagnosis, context);
+    print_gap(answer.diagnosis, !options.run.empty(), context);
     return {};
   }
   Json json = document("gap-diagnose");

@@ -1,5 +1,5 @@
 // sixpoint history SERIAL: all records of a unit in the store, oldest first: constants, runs,
-// writes to it, repaired files, corrections.
+// writes to it, repaired files, corrections, and what engineers decided about it.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -126,6 +126,29 @@ Json to_json(const db::Correction& correction) {
           {"reason", correction.reason}};
 }
 
+Json to_json(const db::StationEvent& event) {
+  return {{"id", event.id},
+          {"made_at", to_iso8601(event.made_at)},
+          {"action", event.action},
+          {"station", text_or_null(event.station)},
+          {"operator", event.operator_name},
+          {"reason", event.reason}};
+}
+
+// What engineers decided about the unit (db/records.h).
+Result<std::vector<db::StationEvent>> events_of(db::Store& store, const std::string& serial) {
+  SIXPOINT_ASSIGN(auto events, store.station_events());
+  std::erase_if(events, [&](const db::StationEvent& event) { return event.serial != serial; });
+  return events;
+}
+
+std::string in_words(const std::string& action) {
+  return action == "release"          ? "released"
+         : action == "check_unit"     ? "check unit"
+         : action == "check_unit_end" ? "no check unit any more"
+                                      : action;
+}
+
 template <class Records>
 Json array_of(const Records& records) {
   Json array = Json::array();
@@ -164,7 +187,8 @@ std::string values_of(const db::RunRecord& run) {
 }
 
 // A line per record, by the time of day at which it was made.
-void print_history(const db::UnitHistory& history, Context& context) {
+void print_history(const db::UnitHistory& history, const std::vector<db::StationEvent>& events,
+                   Context& context) {
   std::vector<std::pair<UtcTime, std::vector<std::string>>> lines;
   const auto line = [&](UtcTime time, std::string what, std::string state, const std::string& id,
                         std::string values) {
@@ -195,6 +219,10 @@ void print_history(const db::UnitHistory& history, Context& context) {
          correction.table == "units" ? "" : correction.row_id,
          fmt::format("{} ({})", printable(correction.reason), printable(correction.operator_name)));
   }
+  for (const auto& event : events) {
+    line(event.made_at, in_words(event.action), printable(event.station, 60), event.id,
+         fmt::format("{} ({})", printable(event.reason), printable(event.operator_name)));
+  }
   std::ranges::stable_sort(lines, {}, [](const auto& one) { return one.first; });
   Columns list({"when", "record", "state", "id", "values"});
   for (auto& [time, texts] : lines) {
@@ -207,12 +235,13 @@ Status run_history(const HistoryCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   const std::string serial = stored_serial(store, options.serial);
   SIXPOINT_ASSIGN(const auto history, store.unit_history(serial));
-  if (history.empty()) {
+  SIXPOINT_ASSIGN(const auto events, events_of(store, serial));
+  if (history.empty() && events.empty()) {
     return fail(ErrorCode::no_input, "the store has no records of this unit", options.serial,
                 "'sixpoint units' lists the units in the store");
   }
   if (!options.json) {
-    print_history(history, context);
+    print_history(history, events, context);
     return {};
   }
   Json json = document("history");
@@ -227,6 +256,7 @@ Status run_history(const HistoryCommandOptions& options, Context& context) {
   json["writes"] = array_of(history.writes);
   json["repairs"] = array_of(history.repairs);
   json["corrections"] = array_of(history.corrections);
+  json["events"] = array_of(events);
   return print_json(context, json);
 }
 
@@ -234,8 +264,8 @@ Status run_history(const HistoryCommandOptions& options, Context& context) {
 
 void add_history(CLI::App& app, Context& context) {
   auto [command, options] = add_command<HistoryCommandOptions>(
-      app, context, "history", "all records of a unit in the store: constants, runs, repairs",
-      run_history);
+      app, context, "history",
+      "all records of a unit in the store: constants, runs, repairs, decisions", run_history);
   command.add_option("serial", options.serial, "the unit's serial number")->required();
   add_store_option(command, options.store);
 }

@@ -75,18 +75,31 @@ std::string in_words(const device::Corner& corner) {
 // Asks the person to turn the unit; a jig that turns by itself needs no answer. `stop` is there
 // with such a jig only.
 station::SideAnswer ask(Context& context, double side_s, std::optional<StopRequest>& stop,
-                        const std::string& what) {
+                        mocks::VirtualHands* hands, const std::string& what) {
   if (stop && stop->requested()) {
     return station::SideAnswer::stop;
   }
   const bool by_itself = stop.has_value();
   context.people << fmt::format(
                         "{}; then leave it alone for {:.0f} s{}\n", what, side_s,
-                        by_itself ? "" : ". Lay it down, then press Enter (q and Enter: stop)")
+                        by_itself ? "" : ". Lay it down, then press Enter (s and Enter: stop)")
                  << std::flush;
-  std::string line;
-  return by_itself || (std::getline(context.in, line) && line != "q") ? station::SideAnswer::placed
-                                                                      : station::SideAnswer::stop;
+  if (by_itself) {
+    return station::SideAnswer::placed;
+  }
+  for (std::string line; std::getline(context.in, line);) {
+    const PromptWord word = prompt_word(line);
+    if (word != PromptWord::other) {
+      return word == PromptWord::stop ? station::SideAnswer::stop : station::SideAnswer::placed;
+    }
+    const auto done = hands != nullptr ? hands->obey(line) : Result<std::string>();
+    context.people << (hands == nullptr ? fmt::format("'{}' is no word here", printable(line, 40))
+                       : done           ? *done
+                                        : done.error().brief())
+                   << "; Enter alone: it lies there; s and Enter: stop\n"
+                   << std::flush;
+  }
+  return station::SideAnswer::stop;
 }
 
 Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& options,
@@ -122,13 +135,16 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
                      .may_start(store, unit.identity().serial, options.station));
   CaptureDone done;
   if (unit.abilities().records_on_command) {
+    if (opened.hands) {
+      context.people << kWordsForHands << std::flush;
+    }
     station::CaptureHooks hooks;
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
-      return ask(context, options.side_s, stop,
+      return ask(context, options.side_s, stop, opened.hands.get(),
                  fmt::format("side {} of {}: {}", number, of, in_words(side)));
     };
     hooks.ask_corner = [&](const device::Corner& corner, std::size_t number, std::size_t of) {
-      return ask(context, options.side_s, stop,
+      return ask(context, options.side_s, stop, opened.hands.get(),
                  fmt::format("corner {} of {}: {}", number, of, in_words(corner)));
     };
     hooks.next_answer = [&stop] {
@@ -161,14 +177,16 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
 
 Json to_json(const CaptureDone& done) {
   Json json = document("capture");
-  if (done.report.solved) {
-    json.update(calib::solve_json(*done.report.solved));
-  } else {
+  // The keys of `solve`, whether something was solved or not.
+  json.update(calib::solve_json(done.report.solved.value_or(calib::SolveReport())));
+  if (!done.report.solved) {
     json["serial"] = done.report.serial;
     json["filter"] = calib::to_string(done.report.recording_filter);
-    json["verified"] = false;
+    json["method"] = nullptr;
     json["verdict"] = done.report.stopped ? "stopped" : "refused";
     json["reasons"] = done.report.refusal;
+    json["gravity_m_per_s2"] = nullptr;
+    json["verification"] = nullptr;
   }
   json["notes"] = done.report.notes;
   json["file"] = text_or_null(done.report.file);

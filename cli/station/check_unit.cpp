@@ -54,11 +54,23 @@ Result<Json> record(const CheckUnitCommandOptions& options, db::Store& store,
   return json;
 }
 
+// A mistyped serial number is one of a unit that never comes.
+Status warn_of_unknown(Context& context, db::Store& store, const std::string& serial) {
+  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(serial));
+  if (history.empty()) {
+    context.log().warn("{}: the store knows no such unit", printable(serial));
+  }
+  return {};
+}
+
 // An engineer's decision about a unit.
 Status decide(const CheckUnitCommandOptions& options, Context& context, const char* command,
               const std::string& action, const std::string& done) {
   SIXPOINT_ASSIGN(auto store, signed_store(options, context));
   const std::string serial = stored_serial(store, options.serial);
+  if (action == "check_unit") {
+    SIXPOINT_CHECK(warn_of_unknown(context, store, serial));
+  }
   SIXPOINT_ASSIGN(Json json, record(options, store, serial, command, action));
   json["serial"] = serial;
   json["station"] = options.station;
@@ -88,8 +100,8 @@ Status show_state(const CheckUnitCommandOptions& options, Context& context, cons
   std::string text = printable(state.brief(), 4000) + "\n";
   for (const station::CheckUnitChart& chart : state.charts) {
     const station::ControlChart& one = chart.chart;
-    text +=
-        fmt::format("  {} {}: {} points, ", printable(chart.serial), one.name, one.values.size());
+    text += fmt::format("  {} {}: {} points, ", printable(chart.serial),
+                        station::title_of(one.name), one.values.size());
     text += one.baseline == 0
                 ? std::string("too few for limits yet\n")
                 : fmt::format("{:.3f} within {:.3f} and {:.3f}{}\n", one.values.back(), one.lower,
@@ -125,10 +137,7 @@ Status retest(const CheckUnitCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
   const std::string serial = stored_serial(store, options.serial);
-  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(serial));
-  if (history.empty()) {
-    context.log().warn("{}: the store knows no such unit", printable(serial));
-  }
+  SIXPOINT_CHECK(warn_of_unknown(context, store, serial));
   SIXPOINT_ASSIGN(const auto state,
                   station::StationGuard(context.env, guard_folder(options.store), limits)
                       .unit_state(store, serial));
@@ -142,10 +151,12 @@ Status retest(const CheckUnitCommandOptions& options, Context& context) {
   return print_answer(
       context, options.json, json,
       fmt::format(
-          "{}: {}; {}\n", printable(serial), state.may_start ? "may be measured" : state.reason,
+          "{}: {}; {}\n{}", printable(serial),
+          state.may_start ? "may be measured" : "may not be measured again: " + state.reason,
           state.passes_needed == 1
               ? std::string("one pass counts")
-              : fmt::format("it counts as passed after {} passes in a row", state.passes_needed)));
+              : fmt::format("it counts as passed after {} passes in a row", state.passes_needed),
+          state.may_start ? "" : station::unit_needs_release(state, serial).hint + "\n"));
 }
 
 void add_decision_options(CLI::App& command, CheckUnitCommandOptions& options) {

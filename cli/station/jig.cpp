@@ -153,10 +153,13 @@ Status check_outputs(const JigCommandOptions& options, Outputs& outputs) {
 // An error is reported, and the run goes on.
 void make_papers(Context& context, const JigCommandOptions& options, Outputs& outputs,
                  const db::RunRecord& run, JigDone& done) {
-  const auto report = [&](const Status& made, bool& flag) {
+  auto report = [&, said = std::string()](const Status& made, bool& flag) mutable {
     flag = made.has_value();
     if (!made) {
-      context.log().error("{}", made.error().brief());
+      if (made.error().brief() != said) {  // of both papers the same is said once
+        said = made.error().brief();
+        context.log().error("{}", said);
+      }
       if (made.error().code != ErrorCode::bad_data) {
         context.worsen(static_cast<int>(made.error().code));
       }
@@ -202,7 +205,7 @@ std::optional<station::OperatorCommand> operator_at_terminal(Context& context,
   if (word == "u" || word == "undo") {
     return station::OperatorCommand::undo;
   }
-  if (word == "s" || word == "q" || word == "stop") {
+  if (prompt_word(word) == PromptWord::stop) {
     return station::OperatorCommand::stop;
   }
   if (hands != nullptr && !word.empty()) {
@@ -308,10 +311,7 @@ station::JigHooks terminal_hooks(Context& context, const JigCommandOptions& opti
   if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
     context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
     if (opened.hands) {
-      context.people
-          << "you turn the virtual unit: +z and Enter lays it with its z axis up, -x with "
-             "x down ...; knock; swap\n"
-          << std::flush;
+      context.people << kWordsForHands << std::flush;
     }
   }
   hooks.next_command = [&context, &opened, &stop,
@@ -501,7 +501,7 @@ void print_jig(Context& context, const JigCommandOptions& options, const JigDone
     context.text() << "  " << holds << '\n';
   }
   if (!report.usable()) {
-    for (const std::string& action : station::next_actions(report.codes)) {
+    for (const std::string& action : station::next_actions(report.codes, report.is_last_failure)) {
       context.text() << "  what to do: " << action << '\n';
     }
   }

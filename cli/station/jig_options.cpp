@@ -44,6 +44,16 @@ void add_jig_options(CLI::App& command, JigOptions& options) {
   add_gravity_options(command, options.gravity);
 }
 
+PromptWord prompt_word(std::string_view line) {
+  if (line.ends_with('\r')) {
+    line.remove_suffix(1);
+  }
+  if (line.empty()) {
+    return PromptWord::empty;
+  }
+  return line == "s" || line == "q" || line == "stop" ? PromptWord::stop : PromptWord::other;
+}
+
 Status read_for_device(const std::string& device, Outputs& outputs) {
   const std::string address = device.substr(std::min(device.find(':') + 1, device.size()));
   std::vector<std::string> paths = {address};

@@ -10,6 +10,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "cli/context.h"
 #include "cli/gravity_option.h"
@@ -45,6 +46,10 @@ struct JiggedUnit {
   device::Jig* jig = nullptr;
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
 };
+inline constexpr std::string_view kWordsForHands =
+    "you turn the virtual unit: +z and Enter lays it with its z axis up, -x with x down ...; "
+    "knock; "
+    "swap\n";
 // The files that the address of a device names are read, and never written over: those of
 // drive:FOLDER, faults=FILE of a virtual unit, replay:FILE. Before the command's outputs are looked
 // at.
@@ -54,5 +59,15 @@ Status read_for_device(const std::string& device, Outputs& outputs);
 // motorised jig is stopped or faulty; with --jig-is-free, the operator's word, it is released.
 Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,
                              device::SessionRecorder& recorder);
+
+// What a person typed in a run or a capture.
+//
+// | line          | word  | in a capture, which waits for an answer                            |
+// |---------------|-------|--------------------------------------------------------------------|
+// | empty         | empty | the unit lies on the side that was asked for                       |
+// | s, q, stop    | stop  | the capture stops; so it does where the input ends                 |
+// | any other     | other | for the hands of a virtual unit, where it has some; asked again    |
+enum class PromptWord { empty, stop, other };
+PromptWord prompt_word(std::string_view line);
 
 }  // namespace sixpoint::cli

@@ -1,4 +1,5 @@
 // sixpoint statistics, gage-rr: how the station works.
+#include <algorithm>
 #include <set>
 
 #include <fmt/format.h>
@@ -83,12 +84,17 @@ void print_statistics(Context& context, const Answer& answer) {
   }
   for (const auto& [name, one] : answer.report.capabilities) {
     context.text() << fmt::format("  Cpk {:6.2f} ({:.2f} to {:.2f}), n = {}: {}\n", one.cpk,
-                                  one.cpk_low, one.cpk_high, one.n, name);
+                                  one.cpk_low, one.cpk_high, one.n, station::title_of(name));
   }
-  if (!answer.report.limits_differ.empty()) {
+  if (answer.report.all.units < station::kLeastForCapability) {
+    context.text() << fmt::format("  no Cpk of fewer than {} units\n",
+                                  station::kLeastForCapability);
+  }
+  if (std::vector<std::string> differ = answer.report.limits_differ; !differ.empty()) {
+    std::ranges::transform(differ, differ.begin(), station::title_of);
     context.text() << fmt::format(
         "  no Cpk where units were judged by different limits (--limits FILE names some): {}\n",
-        fmt::join(answer.report.limits_differ, ", "));
+        fmt::join(differ, "; "));
   }
   for (const station::StationState& state : answer.states) {
     context.text() << printable(state.brief(), 4000) << '\n';

@@ -27,9 +27,10 @@ constexpr std::uint8_t kBulk = 3;
 using std::chrono::nanoseconds;
 
 tl::unexpected<Error> broken_capture(std::string what, std::size_t packet = 0) {
-  return fail(ErrorCode::bad_data, std::move(what),
-              packet == 0 ? "capture" : fmt::format("capture, packet {}", packet),
-              "capture with 'tcpdump -i usbmonN -w capture.pcap', Wireshark or USBPcap");
+  return fail(
+      ErrorCode::bad_data, std::move(what),
+      packet == 0 ? "capture" : fmt::format("capture, packet {}", packet),
+      "capture with 'tcpdump -i usbmonN -w capture.pcap', USBPcap, or Wireshark (save as pcap)");
 }
 
 // Integers in the byte order of the machine that captured.
@@ -114,7 +115,7 @@ Result<FileHeader> parse_file_header(std::span<const std::uint8_t> bytes) {
   }
   return bytes[0] == 0x1F && bytes[1] == 0x8B
              ? broken_capture("this capture is compressed; unpack it with gunzip")
-             : broken_capture("this is no capture, neither pcap nor pcapng");
+             : broken_capture("this is no capture of the form pcap");
 }
 
 // usbmon's header (Documentation/usb/usbmon.rst), of 48 or 64 bytes, in the order of the file.

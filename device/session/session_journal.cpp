@@ -175,8 +175,11 @@ Status SessionJournal::finish(bool truncated) {
                       std::make_unique<PartOfFile<WritableFile>>(file_, lines_begin_, end_));
     if (!made) {
       Error error = made.error();
-      error.hint = fmt::format("{}; the transfers are in {}, for 'sixpoint session recover'",
-                               error.hint, printable(name));
+      // The command would end with 73 now, for the journal is there.
+      error.where = target_;
+      error.hint =
+          fmt::format("the transfers are in {}; put that right, then: sixpoint session recover {}",
+                      printable(name), printable(target_));
       return fail(std::move(error));
     }
   }

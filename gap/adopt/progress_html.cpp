@@ -5,6 +5,7 @@
 
 #include "base/text/html.h"
 #include "base/text/svg.h"
+#include "base/time.h"
 #include "gap/adopt/progress.h"
 
 namespace sixpoint::gap {
@@ -12,6 +13,16 @@ namespace sixpoint::gap {
 namespace {
 
 constexpr double kWidth = 860, kHeight = 300, kLeft = 60, kRight = 840, kTop = 20, kBottom = 250;
+
+// "2026-11-30 22:00:35 UTC": a library knows no time zone. A text that is no time stays as it is.
+std::string shown_time(const std::string& made_at) {
+  const auto time = parse_iso8601(made_at);
+  if (!time) {
+    return made_at;
+  }
+  const std::string whole = to_iso8601(*time);
+  return fmt::format("{} {} UTC", whole.substr(0, 10), whole.substr(11, 8));
+}
 
 double most_of(const GapProgress& progress) {
   double most = 1e-9;
@@ -97,8 +108,8 @@ std::string sums_table(const GapProgress& progress) {
       "<table><caption>Gap, root mean square in mg</caption><tr><th>recordings</th><th>number</th>"
       "<th>before</th>";
   for (const PopulationState& state : progress.history) {
-    out +=
-        fmt::format("<th>after adoption {} ({})</th>", state.adoption, html_escaped(state.made_at));
+    out += fmt::format("<th>after adoption {} ({})</th>", state.adoption,
+                       html_escaped(shown_time(state.made_at)));
   }
   out += "<th>floor</th><th>closed</th></tr>";
   const auto row = [&](const char* name, const ProgressSum& sum) {

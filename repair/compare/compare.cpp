@@ -101,12 +101,14 @@ Result<PairComparison> compare(const Trace& a, const Trace& b, const CompareOpti
   return result;
 }
 
+double PairComparison::shown_lag_s() const { return std::round(lag_s * 1e4) / 1e4 + 0.0; }
+
 std::string PairComparison::brief() const {
   return fmt::format(
       "{} and {}: lag {:.4f} s{}, RMS {:.1f} mg, envelopes {:+.1f} mg (sd {:.1f}, 95 % within "
       "{:.1f}) over {:.0f} s",
-      a, b, lag_s, aligned ? "" : " (not aligned)", rms_mg, envelope.mean_mg, envelope.sd_mg,
-      envelope.p95_mg, overlap_s);
+      a, b, shown_lag_s(), aligned ? "" : " (not aligned)", rms_mg, envelope.mean_mg,
+      envelope.sd_mg, envelope.p95_mg, overlap_s);
 }
 
 nlohmann::ordered_json PairComparison::to_json() const {

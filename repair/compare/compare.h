@@ -86,6 +86,7 @@ struct PairComparison {
   Histogram histogram;
   std::vector<std::string> remarks;
 
+  double shown_lag_s() const;  // with the four digits that people see, and never "-0.0000"
   std::string brief() const;
   bool usable() const { return aligned && envelope.errors > 0; }
   nlohmann::ordered_json to_json() const;  // the keys of the contract, and the others above

@@ -178,7 +178,7 @@ std::string draw(const PairComparison& pair, const Trace& a, const Trace& b) {
       "<p>Lag {:.4f} s (&plusmn; {:.4f}), drift {:.1f} ppm, {:.0f} s in common. RMS {:.1f} mg. "
       "Envelopes: mean {:+.1f} mg, standard deviation {:.1f} mg, 95 % within {:.1f} mg.</p>{}\n"
       "<h3>Vector magnitude</h3>{}<h3>Ten lively seconds</h3>{}<h3>Histogram of errors</h3>{}",
-      kColours[0], escaped(pair.a), kColours[1], escaped(pair.b), pair.lag_s,
+      kColours[0], escaped(pair.a), kColours[1], escaped(pair.b), pair.shown_lag_s(),
       pair.lag_uncertainty_s, pair.drift_ppm, pair.overlap_s, pair.rms_mg, pair.envelope.mean_mg,
       pair.envelope.sd_mg, pair.envelope.p95_mg, remarks, whole.finish(), zoom.finish(),
       histogram(pair));

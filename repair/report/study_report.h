@@ -27,7 +27,7 @@ namespace sixpoint::repair {
 
 struct StudyPage {
   std::string title;
-  std::string made_at;
+  std::string made_at;  // as people read it
   std::string software;
 };
 

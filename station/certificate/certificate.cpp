@@ -163,6 +163,13 @@ std::string zpl_text(std::string_view text) {
 
 }  // namespace
 
+std::string method_in_words(const std::string& method) {
+  return method == "six_pose_letter"   ? "the published formulas of six positions"
+         : method == "six_pose_pair"   ? "least squares, each axis by itself"
+         : method == "six_pose_vector" ? "least squares, all axes together"
+                                       : method;
+}
+
 Result<Certificate> certificate_of(const db::RunRecord& run) {
   const Json json = parse_json(run.document);
   const Document document(json);
@@ -171,8 +178,8 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
       *verdict == JigVerdict::inconclusive || !document.in("constants").has("zero_lsb")) {
     return fail(
         ErrorCode::bad_data,
-        fmt::format("run {} ended as '{}' and has no result to certify", printable(run.id, 60),
-                    printable(run.verdict, 40)),
+        fmt::format("run {} ended as '{}' and has no result to certify",
+                    printable(db::shown_id(run.id)), printable(run.verdict, 40)),
         {},
         verdict == JigVerdict::fail
             ? "the unit failed before its six sides were measured; the run's report says why"
@@ -212,9 +219,10 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   out.written = document.in("as_left").flag("written");
   out.method = document.text("method");
   if (!read_results(document, out) || out.quantities.empty()) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("run {} lacks what a certificate needs", printable(run.id, 60)), {},
-                "an earlier version of the program made it; measure the unit again");
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("run {} lacks what a certificate needs", printable(db::shown_id(run.id))), {},
+        "an earlier version of the program made it; measure the unit again");
   }
   out.poses = read_poses(document.list("poses"));
   out.verification = read_poses(document.in("verification").list("poses"));

@@ -59,7 +59,7 @@ struct Certificate {
   std::optional<Constants> as_left;
   bool written = false;
 
-  std::string method;  // "six_pose_pair" ...
+  std::string method;  // "six_pose_pair" ..., of JigReport
   PerAxis<double> sensitivity_g_per_lsb{};
   PerAxis<double> zero_lsb{};
   PerAxis<double> sensitivity_expanded_percent{};
@@ -88,6 +88,9 @@ struct Certificate {
 
 // bad_data where the record is no complete jig run. One that was stopped or is inconclusive has no
 // result to certify; a failed one has.
+// The method for people: "six_pose_pair" is "least squares, each axis by itself". A method that this
+// program does not know stays as it is.
+std::string method_in_words(const std::string& method);
 Result<Certificate> certificate_of(const db::RunRecord& run);
 // A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN".
 Result<Bytes> certificate_pdf(const Certificate& certificate);

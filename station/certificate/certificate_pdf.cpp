@@ -266,7 +266,7 @@ class Sheet : PageFlow {
              fmt::format("{} m/s\u00b2 \u00b1 {} m/s\u00b2",
                          fixed(certificate_.gravity_m_per_s2, places), fixed(gravity_u, places))}}},
           {{{"Change", change == nullptr ? "not stated" : fixed(change->value, 1) + " \u00b0C"},
-            {"Evaluation", or_not_stated(certificate_.method)}}}});
+            {"Evaluation", or_not_stated(method_in_words(certificate_.method))}}}});
     y_mm_ += 0.8;
     paragraph(
         "The unit was held still on the jig with each of its axes up and down in turn, and the "

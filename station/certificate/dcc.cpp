@@ -310,7 +310,8 @@ std::string certificate_dcc(const Certificate& certificate) {
           xml.element("dcc:measurementResult", [&] {
             xml.words("dcc:name", "Six-position calibration");
             xml.element("dcc:usedMethods", [&] {
-              xml.element("dcc:usedMethod", [&] { xml.words("dcc:name", certificate.method); });
+              xml.element("dcc:usedMethod",
+                          [&] { xml.words("dcc:name", method_in_words(certificate.method)); });
             });
             xml.element("dcc:measuringEquipments", [&] {
               xml.element("dcc:measuringEquipment", [&] {

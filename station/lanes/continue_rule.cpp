@@ -17,8 +17,9 @@ Result<bool> run_goes_on(const UnfinishedRun& left, const UnfinishedRun& now) {
         fmt::format("the run of {} that was left was begun {} '{}', and this is '{}'",
                     printable(left.serial, 40), what, printable(began, 60), printable(is_now, 60)),
         option,
-        fmt::format("give {} as it was begun, and the run goes on; or begin anew (--anew)",
-                    option));
+        fmt::format("{}, and the run goes on; or begin anew (--anew)",
+                    began.empty() ? fmt::format("leave {} out, as when it was begun", option)
+                                  : fmt::format("give {} as it was begun", option)));
   };
   if (left.jig_id && *left.jig_id != now.jig_id) {
     return refuse("on jig", *left.jig_id, now.jig_id.value_or(""), "--jig-id");

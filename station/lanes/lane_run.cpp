@@ -26,7 +26,8 @@ Json json_of(const JigReport& report) {
   json["serial"] = report.serial;
   json["verdict"] = to_string(report.verdict);
   json["reasons"] = report.reasons;
-  json["next_actions"] = report.usable() ? Json::array() : Json(next_actions(report.codes));
+  json["next_actions"] =
+      report.usable() ? Json::array() : Json(next_actions(report.codes, report.is_last_failure));
   json["residual_mg"] =
       report.verification.poses.empty() ? Json(nullptr) : Json(report.verification.worst_mg);
   json["as_found_residual_mg"] =

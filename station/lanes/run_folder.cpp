@@ -52,6 +52,8 @@ Status parse_common(const Json& json, Unfinished& work) {
 Json retest_to_json(const std::optional<RetestState>& state) {
   return state ? Json{{"failures_in_row", state->failures_in_row},
                       {"passes_needed", state->passes_needed},
+                      {"failures_left",
+                       state->failures_left ? Json(*state->failures_left) : Json(nullptr)},
                       {"retest_of", state->retest_of}}
                : Json(nullptr);
 }
@@ -64,6 +66,9 @@ std::optional<RetestState> parse_retest(const Json& json) {
   json.at("failures_in_row").get_to(state.failures_in_row);
   json.at("passes_needed").get_to(state.passes_needed);
   json.at("retest_of").get_to(state.retest_of);
+  if (const Json left = json.value("failures_left", Json(nullptr)); !left.is_null()) {
+    state.failures_left = left.get<int>();  // not in a run that 0.1.0 left
+  }
   return state;
 }
 

@@ -73,6 +73,20 @@ const QuantityInfo* find_quantity(std::string_view name) {
   return found == quantities().end() ? nullptr : &*found;
 }
 
+std::string title_of(std::string_view name_and_axis) {
+  const std::size_t space = name_and_axis.find(' ');
+  const QuantityInfo* info = find_quantity(name_and_axis.substr(0, space));
+  if (info == nullptr) {
+    return std::string(name_and_axis);
+  }
+  std::string title(info->title);
+  if (space != std::string_view::npos) {
+    title += fmt::format(" {}", name_and_axis.substr(space + 1));
+  }
+  title += info->unit.empty() ? "" : fmt::format(", {}", info->unit);
+  return title;
+}
+
 const Limit& Limits::of(std::string_view name) const {
   const auto found = std::find_if(limits.begin(), limits.end(),
                                   [&](const Limit& limit) { return limit.name == name; });

@@ -37,6 +37,9 @@ struct QuantityInfo {
 };
 const std::vector<QuantityInfo>& quantities();
 const QuantityInfo* find_quantity(std::string_view name);  // nullptr where there is none
+// For people, with its axis where it has one: "zero_offset_mg x" is "Zero offset x, mg", as on the
+// page. A name that is no quantity's stays as it is.
+std::string title_of(std::string_view name_and_axis);
 
 struct Limit {
   std::string name;

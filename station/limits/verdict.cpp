@@ -172,7 +172,12 @@ const FailureCode* find_failure_code(std::string_view code) {
   return found == failure_codes().end() ? nullptr : &*found;
 }
 
-std::vector<std::string> next_actions(const std::vector<std::string>& codes) {
+std::vector<std::string> next_actions(const std::vector<std::string>& codes, bool is_last_failure) {
+  if (is_last_failure) {
+    return {
+        "Keep the unit back: it failed as often in a row as the limits allow. It is measured again "
+        "only when an engineer has released it (sixpoint retest SERIAL --release)."};
+  }
   std::vector<std::string> actions;
   for (const std::string& code : codes) {
     const FailureCode* known = find_failure_code(code);
@@ -336,6 +341,7 @@ RetestState retest_state(const std::vector<EarlierRun>& earlier, const RetestPol
     state.passes_needed = policy.passes_after_failure - passes;
     state.retest_of = last_judged->id;
   }
+  state.failures_left = policy.most_failures - state.failures_in_row;
   if (state.failures_in_row >= policy.most_failures) {
     state.may_start = false;
     state.reason = fmt::format("the unit failed {} times in a row, as often as the limits allow",
@@ -355,6 +361,11 @@ void apply_retest(Verdict& verdict, const RetestState& state) {
         fmt::format("the unit failed before; it counts as passed after {} more in a row",
                     state.passes_needed - 1));
   }
+}
+
+bool is_last_failure(JigVerdict verdict, const RetestState& state) {
+  return (verdict == JigVerdict::fail || verdict == JigVerdict::conditional_fail) &&
+         state.failures_left && *state.failures_left <= 1;
 }
 
 }  // namespace sixpoint::station

@@ -50,8 +50,12 @@ struct FailureCode {
 };
 const std::vector<FailureCode>& failure_codes();
 const FailureCode* find_failure_code(std::string_view code);
-// The next actions for a run's codes: each once, in their order.
-std::vector<std::string> next_actions(const std::vector<std::string>& codes);
+// What the person does next:
+//
+//   a run that was the last failure that the limits allow    the unit is kept back, and nothing else
+//   any other                                                that of each code, once, in their order
+std::vector<std::string> next_actions(const std::vector<std::string>& codes,
+                                      bool is_last_failure = false);
 
 // A value to be judged.
 struct Measured {
@@ -107,10 +111,15 @@ struct RetestState {
   bool may_start = true;
   std::string retest_of;  // the run that the next one repeats; empty where it repeats none
   std::string reason;     // why it may not start, for people
+  // That the limits still allow; nothing where failures do not count (check units, studies), or
+  // nobody can say how many there were.
+  std::optional<int> failures_left = {};
 };
 // `earlier`: oldest first.
 RetestState retest_state(const std::vector<EarlierRun>& earlier, const RetestPolicy& policy);
 // A pass that is not yet enough becomes conditional, with the code `retest`.
 void apply_retest(Verdict& verdict, const RetestState& state);
+// Was this run, behind `state`, the last failure that the limits allow?
+bool is_last_failure(JigVerdict verdict, const RetestState& state);
 
 }  // namespace sixpoint::station

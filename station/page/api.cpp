@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "base/text/json_text.h"
@@ -339,6 +340,11 @@ ApiAnswer Api::post(const ApiRequest& request) {
     if (body.is_discarded() || !body.is_object()) {
       return refusal(400, "bad_json", "the body is no JSON object");
     }
+  }
+  const bool has_number = parts.size() == 3 && (parts[0] == "lanes" || parts[0] == "runs");
+  const auto route = fmt::format("{}", fmt::join(parts, "/"));
+  if (auto refused = refused_key(has_number ? parts[0] + "/" + parts[2] : route, body)) {
+    return *std::move(refused);
   }
   if (parts.size() == 1 && parts[0] == "session") {
     return open_session(body);

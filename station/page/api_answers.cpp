@@ -1,7 +1,13 @@
 #include "station/page/api_answers.h"
 
-#include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/error.h"
 #include "db/name_rule.h"
 
 namespace sixpoint::station {
@@ -27,6 +33,36 @@ int http_status(ErrorCode code) {
     default:
       return 500;
   }
+}
+
+struct Route {
+  std::string_view name;
+  std::vector<std::string_view> keys;
+};
+
+const auto& post_routes() {
+  static const std::array<Route, 19> kRoutes = {{
+      {"session", {"code"}},
+      {"operator", {"name", "pin"}},
+      {"code", {}},
+      {"run", {"lane", "operator", "serial", "write", "last_run"}},
+      {"capture", {"lane", "operator", "serial", "write", "last_run"}},
+      {"scan", {"serial", "dismiss"}},
+      {"check", {"file", "save"}},
+      {"check-units", {"serial", "action", "operator", "reason"}},
+      {"station-lock", {"operator", "reason", "new_baseline"}},
+      {"repair", {"folder", "output", "calibration_file"}},
+      {"repair/cancel", {}},
+      {"runs/print", {}},
+      {"lanes/undo", {}},
+      {"lanes/stop", {}},
+      {"lanes/placed", {}},
+      {"lanes/jig-free", {}},
+      {"lanes/take", {"operator"}},
+      {"lanes/scan", {"serial"}},
+      {"lanes/hand", {"do", "pose", "tilt_deg", "serial"}},
+  }};
+  return kRoutes;
 }
 
 }  // namespace
@@ -70,6 +106,22 @@ std::optional<std::string> text_of(const Json& body, const char* key) {
   }
   auto text = body[key].get<std::string>();
   return db::check_name(text) ? std::optional(std::move(text)) : std::nullopt;
+}
+
+std::optional<ApiAnswer> refused_key(std::string_view route, const Json& body) {
+  const auto found = std::ranges::find(post_routes(), route, &Route::name);
+  if (found == post_routes().end()) {
+    return std::nullopt;
+  }
+  for (const auto& [key, value] : body.items()) {
+    if (std::ranges::find(found->keys, key) == found->keys.end()) {
+      return refusal(
+          400, "bad_request", fmt::format("'{}' is no key of this request", printable(key, 60)),
+          found->keys.empty() ? "it has none"
+                              : fmt::format("its keys are {}", fmt::join(found->keys, ", ")));
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace sixpoint::station

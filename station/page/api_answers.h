@@ -32,5 +32,9 @@ ApiAnswer unknown_route();
 // A text field of a JSON body; empty where it is missing. Nothing where it is no text, longer than
 // kMostText, or none that the store takes (db::check_name()).
 std::optional<std::string> text_of(const nlohmann::ordered_json& body, const char* key);
+// The refusal of a key of the body that is none of its route's (docs/station.md, Routes; a lane's
+// number and a run's id are left out of the route: "lanes/take"). A mistyped `Lane` would start
+// lane 1. Nothing where all are its own, and for a route that is none.
+std::optional<ApiAnswer> refused_key(std::string_view route, const nlohmann::ordered_json& body);
 
 }  // namespace sixpoint::station

@@ -120,6 +120,10 @@ Result<db::RunFilter> runs_between(const std::string& from, const std::string& t
   db::RunFilter filter;
   SIXPOINT_ASSIGN(filter.from, day(from, "from"));
   SIXPOINT_ASSIGN(filter.to, day(to, "to"));
+  if (filter.from && filter.to && *filter.from > *filter.to) {
+    return fail(ErrorCode::usage, fmt::format("this day is after {}to", prefix), prefix + "from",
+                "the earlier day is first");
+  }
   return filter;
 }
 

@@ -23,19 +23,6 @@ std::string shown(double value, const char* unit) {
   return std::isfinite(value) ? fmt::format("{:.3g} {}", value, unit) : std::string("\u2013");
 }
 
-std::string title_of(std::string_view chart_name) {
-  const std::size_t space = chart_name.find(' ');
-  const QuantityInfo* info = find_quantity(chart_name.substr(0, space));
-  if (info == nullptr) {
-    return std::string(chart_name);
-  }
-  std::string title = fmt::format("{}, {}", info->title, info->unit);
-  if (space != std::string_view::npos) {
-    title += fmt::format(", {}", chart_name.substr(space + 1));
-  }
-  return title;
-}
-
 std::string group_row(const GroupStatistics& group) {
   return fmt::format(
       "<tr><th scope=row>{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",

@@ -145,6 +145,7 @@ void conclude_report(JigReport& report, const JigRun& run, const JigEnding& endi
   }
   apply_retest(judged, ending.retest);
   report.verdict = judged.verdict;
+  report.is_last_failure = is_last_failure(judged.verdict, ending.retest);
   report.codes = std::move(judged.codes);
   report.quantities = std::move(judged.quantities);
   report.reasons.insert(report.reasons.end(), judged.reasons.begin(), judged.reasons.end());

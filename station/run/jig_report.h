@@ -56,6 +56,7 @@ struct JigReport {
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
   std::vector<std::string> codes;    // of verdict.h's catalogue; empty for a pass
+  bool is_last_failure = false;      // verdict.h
   std::vector<std::string> reasons;  // for people
   Limits limits;
   std::vector<JudgedQuantity> quantities;  // empty where the run did not get that far

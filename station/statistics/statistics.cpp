@@ -40,7 +40,7 @@ double median_of(std::vector<double> values) {
 
 std::optional<Capability> capability(const std::vector<double>& values, std::optional<double> low,
                                      std::optional<double> high, double confidence) {
-  if (values.size() < 2 || (!low && !high)) {
+  if (values.size() < kLeastForCapability || (!low && !high)) {
     return std::nullopt;
   }
   Capability out;

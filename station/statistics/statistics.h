@@ -37,8 +37,18 @@ struct Capability {
   double confidence = 0.95;
   nlohmann::ordered_json to_json() const;
 };
+// Of fewer values the interval of a Cpk is about as wide as the Cpk itself, on both sides.
+inline constexpr std::size_t kLeastForCapability = 5;
 // Cp's interval by chi-square (exact for normal data), Cpk's by Bissell (Applied Statistics 39
-// (1990) 331). Nothing with fewer than two values, without scatter, or without limits.
+// (1990) 331).
+//
+// | values          | scatter          | limits | capability |
+// |-----------------|------------------|--------|------------|
+// | fewer than five | any              | any    | none       |
+// | five and more   | none             | any    | none       |
+// | five and more   | some             | none   | none       |
+// | five and more   | some             | one    | Cpk        |
+// | five and more   | some             | both   | Cp and Cpk |
 std::optional<Capability> capability(const std::vector<double>& values, std::optional<double> low,
                                      std::optional<double> high, double confidence = 0.95);
 

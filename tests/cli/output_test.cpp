@@ -121,6 +121,14 @@ TEST_F(OutputLook, TellsThePartsOfRecordsOfTheProgram) {
   write("plan/plan.json", R"({"schema":"sixpoint/archive-plan/1"})");
   write("plan/shards/00000.jsonl", "{}\n");
   EXPECT_EQ(look("plan/shards/00000.jsonl"), Target::record);
+  for (const std::string kind : {"run", "capture"}) {
+    std::filesystem::create_directory(path(kind));
+    write(kind + "/samples-1.csv", "t,x,y,z,c\n");
+    EXPECT_EQ(look(kind + "/samples-1.csv"), Target::plain);
+    write(kind + "/" + kind + ".json", R"({"schema":"sixpoint/unfinished-)" + kind + R"(/1"})");
+    EXPECT_EQ(look(kind + "/samples-1.csv"), Target::record);
+    EXPECT_EQ(look(kind + "/" + kind + ".json"), Target::record);
+  }
   FileSystem& files = posix_env().files;
   EXPECT_EQ(look_at_folder(files, path("bundle")), FolderTarget::record);
   EXPECT_EQ(look_at_folder(files, path("plan")), FolderTarget::record);

@@ -27,6 +27,9 @@ TEST_F(StoreTest, DoctorAnswersEveryCheckAndFailsForAStoreThatWasChanged) {
   for (const char* name : {"version", "store", "journal"}) {
     EXPECT_TRUE(fresh.at(name)) << name;
   }
+  EXPECT_THAT(run({"doctor", "--store", path("none.db")}).out,
+              testing::Not(testing::ContainsRegex("ok +udev +[^\n]*not installed")))
+      << "others than root could not use units";
   EXPECT_TRUE(fresh.contains("disk") && fresh.contains("usb") && fresh.contains("udev"));
   // What could not be made, and nothing of it is made by asking.
   std::filesystem::create_symlink(path("nowhere/a.db"), path("link.db"));

@@ -113,6 +113,8 @@ TEST_F(UnitsCommand, ReportsAreOnePage) {
   const std::string text(bytes.begin(), bytes.end());
   EXPECT_THAT(text, HasSubstr("<figure>"));
   EXPECT_THAT(text, HasSubstr("unit_files"));
+  EXPECT_THAT(text, testing::ContainsRegex("<p>[0-9-]+ [0-9:]+ [+-][0-9:]+, sixpoint"))
+      << "the clock on the wall";
   const std::string plan = folder_ / "plan";
   ASSERT_EQ(run({"archive", "plan", archive_, "-o", plan, "--shards", "2"}).exit_code, 0);
   ASSERT_EQ(run({"archive", "run", plan, "--shard", "0", "-o", folder_ / "out2"}).exit_code, 0);

@@ -114,6 +114,29 @@ TEST_F(CommandTest, CaptureRefusesARateThatNoUnitHas) {
   }
 }
 
+// "stop" and "n" were taken for "the unit lies there", and the recording went on.
+TEST_F(CommandTest, CaptureGoesOnBehindAnEmptyLineAlone) {
+  const auto capture = [&](const std::string& name, const std::string& typed) {
+    return tests::run_command(posix_env(),
+                              {"capture", "--device", kDevice, "--jig", "manual", "--store",
+                               path("s.db"), "-o", path(name)},
+                              typed);
+  };
+  for (const char* word : {"s", "q", "stop"}) {
+    const auto stopped = capture(std::string(word) + ".gt3x", std::string(word) + "\n\n\n");
+    EXPECT_EQ(stopped.exit_code, 3) << word;
+    EXPECT_THAT(stopped.people, HasSubstr("side 1 of 6")) << word;
+    EXPECT_THAT(stopped.people, testing::Not(HasSubstr("side 2 of 6"))) << word;
+  }
+  const auto asked = capture("n.gt3x", "n\nu\n\nnein\n");
+  EXPECT_EQ(asked.exit_code, 3);
+  EXPECT_THAT(asked.people, HasSubstr("'n' is no word here; Enter alone: it lies there; s and "
+                                      "Enter: stop"));
+  EXPECT_THAT(asked.people, HasSubstr("side 2 of 6"));
+  EXPECT_THAT(asked.people, HasSubstr("'nein' is no word here"));
+  EXPECT_THAT(asked.people, testing::Not(HasSubstr("side 3 of 6")));
+}
+
 TEST_F(CommandTest, CaptureRefusesAFirmwareWhoseFileCannotHelp) {
   const auto answer = run({"capture", "--device", "virtual:seed=7,firmware=1.8.0,jig=auto", "-o",
                            path("c.gt3x"), "--store", path("s.db"), "--json"});
@@ -122,6 +145,36 @@ TEST_F(CommandTest, CaptureRefusesAFirmwareWhoseFileCannotHelp) {
   EXPECT_EQ(json["verdict"], "refused");
   EXPECT_EQ(json["filter"], "legacy");
   EXPECT_THAT(json["reasons"].dump(), HasSubstr("firmware from 1.4.0 to 1.7.0"));
+}
+
+// Oracle: the keys of `solve` for a file without constants.
+TEST_F(CommandTest, CaptureWithoutAResultHasTheKeysOfSolve) {
+  const auto solved = run({"capture", "--device", kDevice, "--jig", "virtual", "--store",
+                           path("s.db"), "-o", path("c.gt3x"), "--json"});
+  const auto refused = run({"capture", "--device", "virtual:seed=7,firmware=1.8.0,jig=auto", "-o",
+                            path("d.gt3x"), "--store", path("s.db"), "--json"});
+  const auto stopped = tests::run_command(posix_env(),
+                                          {"capture", "--device", kDevice, "--jig", "manual",
+                                           "--store", path("s.db"), "-o", path("e.gt3x"), "--json"},
+                                          "s\n");
+  for (const auto& json : {refused.json(), stopped.json()}) {
+    for (const char* key :
+         {"serial", "filter", "method", "constants", "standard_uncertainty", "points", "coverage_g",
+          "residual_mg", "verified", "verdict", "reasons", "missing_directions", "notes",
+          "iterations", "seconds", "file", "sha256", "stored_id"}) {
+      EXPECT_TRUE(json.contains(key)) << key;
+      EXPECT_TRUE(solved.json().contains(key)) << key;
+    }
+    EXPECT_TRUE(json["method"].is_null());
+    EXPECT_TRUE(json["constants"].is_null());
+    EXPECT_EQ(json["points"], 0);
+    EXPECT_TRUE(json["residual_mg"]["before"].is_null());
+    EXPECT_EQ(json["missing_directions"], Json::array());
+    EXPECT_EQ(json["verified"], false);
+  }
+  EXPECT_EQ(refused.json()["verdict"], "refused");
+  EXPECT_EQ(stopped.json()["verdict"], "stopped");
+  EXPECT_EQ(stopped.json()["serial"], "MOS2A45130007");
 }
 
 }  // namespace

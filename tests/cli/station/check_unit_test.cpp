@@ -16,9 +16,12 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
   const std::string check =
       "serial=MOS2A00000001,true_sensitivity_lsb_per_g=240/240/240,"
       "true_zero_lsb=20/20/20,seed=";
-  ASSERT_EQ(run({"check-unit", "add", "MOS2A00000001", "--operator", "Eve", "--reason", "watch"})
-                .exit_code,
-            0);
+  const auto added =
+      run({"check-unit", "add", "MOS2A00000001", "--operator", "Eve", "--reason", "watch"});
+  ASSERT_EQ(added.exit_code, 0);
+  EXPECT_THAT(added.people, HasSubstr("MOS2A00000001: the store knows no such unit"));
+  EXPECT_THAT(run({"history", "MOS2A00000001"}).out, HasSubstr("watch (Eve)"))
+      << "before its first run";
   EXPECT_EQ(run({"check-unit", "remove", "MOS2A0000000", "--operator", "Eve", "--reason", "typo"})
                 .exit_code,
             66)
@@ -108,9 +111,15 @@ TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {
   EXPECT_EQ(first.json()["verdict"], "conditional_pass");
   EXPECT_THAT(first.json()["codes"], Contains("retest"));
   EXPECT_EQ(measure(unit).json()["verdict"], "pass");
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(measure(unit, tight).exit_code, 1);
   }
+  std::vector<std::string> last = {"jig", "--device", "virtual:jig=auto," + unit, "--station", "A"};
+  last.insert(last.end(), tight.begin(), tight.end());
+  const auto third = run(last);
+  EXPECT_EQ(third.exit_code, 1);
+  EXPECT_THAT(third.out, HasSubstr("what to do: Keep the unit back"));
+  EXPECT_THAT(third.out, testing::Not(HasSubstr("epeat")));
   EXPECT_EQ(measure(unit).exit_code, 78);
   const auto file =
       run({"capture", "--device", "virtual:jig=auto," + unit, "-o", folder_ / "c.gt3x", "--json"});
@@ -119,12 +128,25 @@ TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {
   const auto state = run({"retest", "MOS2A00000009", "--json"});
   EXPECT_EQ(state.exit_code, 1);
   EXPECT_EQ(state.json()["failures_in_row"], 3);
+  EXPECT_THAT(
+      run({"retest", "MOS2A00000009"}).out,
+      testing::AllOf(HasSubstr("MOS2A00000009: may not be measured again: the unit failed 3"),
+                     HasSubstr("sixpoint retest MOS2A00000009 --release")));
   const auto small = run({"retest", "mos2a00000009", "--json"});
   EXPECT_EQ(small.json(), state.json()) << "the same unit, as 'scan' has it";
   const auto released = run({"retest", "mos2a00000009", "--release", "--operator", "Eve",
                              "--reason", "new battery", "--json"});
   EXPECT_EQ(released.exit_code, 0);
   EXPECT_EQ(released.json()["serial"], "MOS2A00000009");
+  const auto events = run({"history", "MOS2A00000009", "--json"}).json()["events"];
+  ASSERT_EQ(events.size(), 1U) << events;
+  EXPECT_EQ(events[0]["id"], released.json()["stored_id"]);
+  EXPECT_EQ(events[0]["action"], "release");
+  EXPECT_EQ(events[0]["operator"], "Eve");
+  EXPECT_EQ(events[0]["reason"], "new battery");
+  EXPECT_TRUE(events[0]["made_at"].is_string());
+  EXPECT_THAT(run({"history", "MOS2A00000009"}).out,
+              testing::ContainsRegex("released .*[0-9a-f]{12} +new battery .Eve."));
   EXPECT_EQ(measure(unit).exit_code, 0);
 }
 

@@ -45,6 +45,18 @@ TEST(JigOptions, OnlyTheDeviceIsRequired) {
   EXPECT_THROW(app.parse("--device virtual:seed=7 --gravity heavy"), CLI::ConversionError);
 }
 
+TEST(JigOptions, WordsAtThePromptFollowTheTable) {
+  for (const char* line : {"", "\r"}) {
+    EXPECT_EQ(prompt_word(line), PromptWord::empty);
+  }
+  for (const char* line : {"s", "q", "stop", "stop\r"}) {
+    EXPECT_EQ(prompt_word(line), PromptWord::stop) << line;
+  }
+  for (const char* line : {"n", "u", "nein", "S", " ", "+z", "stopp"}) {
+    EXPECT_EQ(prompt_word(line), PromptWord::other) << line;
+  }
+}
+
 struct Opening {
   Result<JiggedUnit> open(const std::string& device, const std::string& jig,
                           const std::string& record = {}) {

@@ -78,6 +78,17 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
   }
 }
 
+TEST_F(CommandTest, JigSaysOnceWhyARunHasNoPapers) {
+  const auto answer = run({"jig", "--store", path("s.db"), "--device", kDevice, "--jig", "manual",
+                           "--write", "--certificate", path("c.pdf"), "--label", path("l.zpl")});
+  EXPECT_EQ(answer.exit_code, 2);
+  const std::size_t first = answer.people.find("has no result to certify");
+  ASSERT_NE(first, std::string::npos) << answer.people;
+  EXPECT_EQ(answer.people.find("has no result to certify", first + 1), std::string::npos)
+      << answer.people;
+  EXPECT_THAT(answer.people, testing::ContainsRegex("run [0-9a-f]{12} ended as 'inconclusive'"));
+}
+
 // Ctrl-C in a run by a jig: the motor stops, the run is stored as stopped, exit 3.
 // The table of who_measures() (cli/station/operator.h), row by row. Oracle: the certificate.
 TEST_F(CommandTest, JigAsksForThePinWhereThereAreOperators) {
@@ -318,7 +329,8 @@ TEST_F(CommandTest, ProductionPlusGoesOnAfterACrash) {
   elsewhere.insert(elsewhere.end(), {"--jig-id", "J-2"});
   const auto refused = run(elsewhere);
   EXPECT_EQ(refused.exit_code, 64) << "the readings that are there are of another jig";
-  EXPECT_THAT(refused.people, HasSubstr("give --jig-id as it was begun, and the run goes on"));
+  EXPECT_THAT(refused.people,
+              HasSubstr("leave --jig-id out, as when it was begun, and the run goes on"));
   const auto answer = run(words);
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   EXPECT_THAT(answer.people, testing::ContainsRegex("goes on; it has 1[56] placements"));

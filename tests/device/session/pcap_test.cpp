@@ -232,7 +232,9 @@ TEST(Pcap, RefusesWhatItDoesNotReadAndSaysWhatItIs) {
   };
   const Session session = tests::made_session(2);
   EXPECT_THAT(why({}), HasSubstr("too short"));
-  EXPECT_THAT(why(Bytes(100, 0)), HasSubstr("neither pcap nor pcapng"));
+  EXPECT_THAT(why(Bytes(100, 0)), HasSubstr("this is no capture"));
+  EXPECT_THAT(session_from_pcap(Bytes(100, 0), {}).error().hint, HasSubstr("save as pcap"))
+      << "what Wireshark writes by itself is not read";
   Bytes zipped(100, 0);
   zipped[0] = 0x1F;
   zipped[1] = 0x8B;

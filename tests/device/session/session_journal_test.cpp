@@ -237,6 +237,22 @@ TEST(SessionJournal, AFullDiskDoesNotDisturbTheWork) {
   EXPECT_EQ(read_session(files, "s.zip")->transfers.size(), 2U) << "identify and its reply";
 }
 
+// "Free some space and run the command again": that was refused, for the journal is there.
+TEST(SessionJournal, ASessionThatCannotBeFinishedSaysWhatCanBeDone) {
+  MemoryFiles files;
+  auto journal = SessionJournal::create(files, "s.zip");
+  ASSERT_OK(journal);
+  ASSERT_OK(journal->begin(whole().device, whole().started));
+  files.fail_after(0);
+  const Status finished = journal->finish(false);
+  files.stop_failing();
+  EXPECT_FAILS(finished, ErrorCode::io);
+  EXPECT_EQ(finished.error().where, "s.zip");
+  EXPECT_EQ(finished.error().hint,
+            "the transfers are in s.zip.journal; put that right, then: sixpoint session recover "
+            "s.zip");
+}
+
 // kill -9, on a real disk: every transfer that the program had is there.
 TEST(SessionJournal, AKilledProgramLosesNoTransfer) {
   const tests::TemporaryFolder folder;

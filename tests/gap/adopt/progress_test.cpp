@@ -38,7 +38,7 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   const RecordedBundle fresh = unit_with("B", 3, 0.008);
   ScenarioHistory history;
   history.states = {{1, "2026-01-01T00:00:00Z", 1, {cross_population(0.004)}},
-                    {2, "2026-02-01T00:00:00Z", 2, {cross_population(0.008)}}};
+                    {2, "2026-02-01T00:00:00.123456789Z", 2, {cross_population(0.008)}}};
   history.documents = {evidence_of(known.diagnosis).id};
   ProgressRecorder recorder(history);
   ASSERT_OK(recorder.add("a", known));
@@ -68,6 +68,7 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   const std::string page = progress_html(progress);
   EXPECT_THAT(page, HasSubstr("<svg"));
   EXPECT_THAT(page, HasSubstr("b &lt;b&gt;"));
+  EXPECT_THAT(page, HasSubstr("after adoption 2 (2026-02-01 00:00:00 UTC)"));
   EXPECT_THAT(page, testing::Not(
                         testing::AnyOf(HasSubstr("http"), HasSubstr("src="), HasSubstr("<script"))))
       << "one page without other files";

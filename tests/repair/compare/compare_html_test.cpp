@@ -83,6 +83,16 @@ PairComparison made_pair() {
   return pair;
 }
 
+TEST(CompareHtml, ALagOfNothingHasNoSign) {
+  PairComparison pair = made_pair();
+  for (const double lag_s : {-0.00001, 0.00001, 0.0}) {
+    pair.lag_s = lag_s;
+    EXPECT_THAT(pair.brief(), HasSubstr("lag 0.0000 s"));
+  }
+  pair.lag_s = -0.5173;
+  EXPECT_THAT(pair.brief(), HasSubstr("lag -0.5173 s"));
+}
+
 // Ten seconds at 1 g; then a step to 2 g.
 Trace made_trace(const std::string& name, double start_s) {
   std::vector<float> magnitudes(600, 1.0F);

@@ -5,6 +5,7 @@
 
 #include "expect_result.h"
 #include "station/certificate/certificate_record.h"
+#include "station/certificate/dcc.h"
 
 namespace sixpoint::station {
 namespace {
@@ -19,6 +20,18 @@ TEST(Certificate, TheSameRunGivesTheSameBytes) {
   db::RunRecord other = run;
   other.operator_name = "Bo";
   EXPECT_NE(*certificate_pdf(*certificate_of(run)), *certificate_pdf(*certificate_of(other)));
+}
+
+TEST(Certificate, ThePersonWhoReadsItIsToldTheMethodInWords) {
+  const auto certificate = certificate_of(record_of(7, writing()));
+  EXPECT_EQ(certificate->to_json()["method"], certificate->method) << "as the run's report has it";
+  EXPECT_THAT(certificate->method, testing::StartsWith("six_pose_"));
+  for (const char* method : {"six_pose_letter", "six_pose_pair", "six_pose_vector"}) {
+    EXPECT_THAT(method_in_words(method), Not(HasSubstr("_")));
+  }
+  EXPECT_THAT(certificate_dcc(*certificate), HasSubstr(method_in_words(certificate->method)));
+  EXPECT_THAT(certificate_dcc(*certificate), Not(HasSubstr("six_pose")));
+  EXPECT_EQ(method_in_words("of a later version"), "of a later version");
 }
 
 TEST(Certificate, AFailedRunHasOneAndAStoppedOneHasNone) {
@@ -36,6 +49,9 @@ TEST(Certificate, AFailedRunHasOneAndAStoppedOneHasNone) {
     run.verdict = verdict;
     EXPECT_FAILS(certificate_of(run), ErrorCode::bad_data);
   }
+  run.id = "0123456789abcdef0123456789abcdef";
+  EXPECT_THAT(certificate_of(run).error().what,
+              testing::StartsWith("run 0123456789ab ended as ''"));
 }
 
 TEST(Certificate, ADocumentThatIsNoneIsRefused) {

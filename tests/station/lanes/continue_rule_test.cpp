@@ -38,6 +38,11 @@ TEST(ContinueRule, ARunGoesOnWhereItWasBegun) {
   ASSERT_FALSE(gravity.has_value());
   EXPECT_THAT(gravity.error().brief(), testing::HasSubstr("9.81 m/s2"));
   EXPECT_THAT(gravity.error().hint, testing::HasSubstr("--anew"));
+  UnfinishedRun nameless = a_left_run();
+  nameless.jig_id = "";
+  const auto named = run_goes_on(nameless, a_left_run());
+  ASSERT_FALSE(named.has_value());
+  EXPECT_THAT(named.error().hint, testing::StartsWith("leave --jig-id out"));
   // A folder of an earlier version.
   UnfinishedRun old = a_left_run();
   old.jig_id.reset();

@@ -192,7 +192,7 @@ TEST(RunFolder, ARunWhoseRowsAreNotAsTheyWereIsRefused) {
   UnfinishedRun run = a_run();
   run.rows_bytes = rows.size();
   run.rows_sha256 = text_sha256(rows);
-  run.retest = RetestState{1, 2, true, "a run", {}};
+  run.retest = RetestState{1, 2, true, "a run", {}, 1};
   struct Row {
     std::string on_disk;
     bool good;
@@ -211,6 +211,7 @@ TEST(RunFolder, ARunWhoseRowsAreNotAsTheyWereIsRefused) {
     if (row.good) {
       ASSERT_OK(left);
       EXPECT_EQ((*left)->retest->passes_needed, 2);
+      EXPECT_EQ((*left)->retest->failures_left, 1);
       EXPECT_EQ((*left)->retest->retest_of, "a run");
     } else {
       EXPECT_FAILS(left, ErrorCode::bad_data);

@@ -23,6 +23,9 @@ TEST(Limits, QuantitiesAreFoundByName) {
   ASSERT_NE(find_quantity("zero_offset_mg"), nullptr);
   EXPECT_EQ(find_quantity("zero_offset_mg")->unit, "mg");
   EXPECT_EQ(find_quantity("zero_offset"), nullptr);
+  EXPECT_EQ(title_of("zero_offset_mg x"), "Zero offset x, mg");
+  EXPECT_EQ(title_of("temperature_c"), "Temperature of the unit, \u00b0C");
+  EXPECT_EQ(title_of("beauty x"), "beauty x");
 }
 
 }  // namespace

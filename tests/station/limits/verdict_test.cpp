@@ -215,6 +215,11 @@ TEST(FailureCodes, WhatToDoIsSaidOnceEach) {
               testing::ElementsAre("Leave it on the bench for an hour and repeat.",
                                    "Stop what shakes the bench, seat the unit anew and repeat."));
   EXPECT_TRUE(next_actions({}).empty());
+  EXPECT_THAT(next_actions({"sensitivity_low"}),
+              testing::ElementsAre(HasSubstr("Repeat the run once")));
+  EXPECT_THAT(next_actions({"sensitivity_low", "noise_high"}, true),
+              testing::ElementsAre(testing::AllOf(HasSubstr("Keep the unit back"),
+                                                  HasSubstr("retest SERIAL --release"))));
 }
 
 TEST(Verdict, NamesAreReadBack) {
@@ -255,6 +260,21 @@ TEST(Retest, AUnitThatFailedNeedsTwoPassesInARow) {
   apply_retest(verdict, retest_state(runs, policy));
   EXPECT_EQ(verdict.verdict, JigVerdict::fail);
   EXPECT_TRUE(verdict.codes.empty());
+}
+
+// "Repeat the run once" behind it, and the next run was refused.
+TEST(Retest, TheThirdFailureInARowIsTheLastOne) {
+  const RetestPolicy policy;
+  std::vector<EarlierRun> runs = {ended(JigVerdict::fail)};
+  EXPECT_FALSE(is_last_failure(JigVerdict::fail, retest_state(runs, policy))) << "the second";
+  runs.push_back(ended(JigVerdict::fail));
+  EXPECT_TRUE(is_last_failure(JigVerdict::fail, retest_state(runs, policy)));
+  EXPECT_TRUE(is_last_failure(JigVerdict::conditional_fail, retest_state(runs, policy)));
+  EXPECT_FALSE(is_last_failure(JigVerdict::inconclusive, retest_state(runs, policy)));
+  EXPECT_FALSE(is_last_failure(JigVerdict::conditional_pass, retest_state(runs, policy)));
+  runs.back().released_after = true;
+  EXPECT_FALSE(is_last_failure(JigVerdict::fail, retest_state(runs, policy)));
+  EXPECT_FALSE(is_last_failure(JigVerdict::fail, RetestState{})) << "a check unit";
 }
 
 TEST(Retest, AfterThreeFailuresInARowAnEngineerDecides) {

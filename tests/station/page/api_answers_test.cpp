@@ -30,6 +30,21 @@ TEST(ApiAnswers, TextFieldsAreTextsOfAtMost200Bytes) {
   EXPECT_FALSE(text_of(Json{{"name", std::string("A\0da", 4)}}, "name")) << "no store takes a NUL";
 }
 
+// Oracle: the bodies of the routes in docs/station.md.
+TEST(ApiAnswers, KeysAreThoseOfTheRouteAlone) {
+  const Json started = {{"lane", 2}, {"operator", "Ada"}, {"serial", ""}, {"write", true}};
+  EXPECT_FALSE(refused_key("run", started));
+  EXPECT_FALSE(refused_key("code", Json::object()));
+  EXPECT_FALSE(refused_key("nothing", started)) << "is not found, and that is said";
+  EXPECT_FALSE(refused_key("lanes/hand", {{"do", "turn"}, {"pose", "+z"}, {"tilt_deg", 3}}));
+  EXPECT_EQ(refused_key("lanes/take", {{"operator", "Ada"}, {"name", "Bo"}})->body,
+            R"({"error":{"code":"bad_request","what":"'name' is no key of this request",)"
+            R"("hint":"its keys are operator"}})");
+  EXPECT_EQ(refused_key("lanes/stop", {{"lane", 2}})->body,
+            R"({"error":{"code":"bad_request","what":"'lane' is no key of this request",)"
+            R"("hint":"it has none"}})");
+}
+
 // JSON has no bytes that are not UTF-8: they become the replacement character.
 TEST(ApiAnswers, BytesThatAreNoUtf8AreReplaced) {
   EXPECT_EQ(dump(Json{{"serial", "A\xff"}}), "{\"serial\":\"A\xEF\xBF\xBD\"}");

@@ -103,13 +103,15 @@ class ApiQuality : public testing::Test {
   std::unique_ptr<Api> api_;
 };
 
-// Oracle: the row of the store. The station is the page's own, whatever the request says.
+// Oracle: the row of the store. The station is the page's own, and no request says another.
 TEST_F(ApiQuality, ACheckUnitThatIsNamedIsInTheStoreAndInTheAnswer) {
-  const ApiAnswer answer = post("/api/check-units", {{"serial", "MOS2A45130007"},
-                                                     {"action", "add"},
-                                                     {"operator", "Eve"},
-                                                     {"reason", "checks bench 1"},
-                                                     {"station", "bench-9"}});
+  Json body = {{"serial", "MOS2A45130007"},
+               {"action", "add"},
+               {"operator", "Eve"},
+               {"reason", "checks bench 1"}};
+  const ApiAnswer answer = post("/api/check-units", body);
+  body["station"] = "bench-9";
+  EXPECT_EQ(post("/api/check-units", body).status, 400);
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(json(answer)["lock"]["check_units"], Json::array({"MOS2A45130007"}));
   EXPECT_NE(json(answer)["stored_id"], "");
@@ -172,7 +174,7 @@ TEST_F(ApiQuality, WrongDecisionsAreRefusedAndNothingIsStored) {
   }
   ApiRequest foreign = request("POST", "/api/station-lock");
   foreign.client.clear();
-  foreign.body = good.dump();
+  foreign.body = Json{{"operator", "Eve"}, {"reason", "why"}}.dump();
   const ApiAnswer refused = api_->handle(foreign);
   EXPECT_EQ(refused.status, 403) << "a form of another page cannot send the page's header";
   EXPECT_EQ(json(refused)["error"]["code"], "client_needed");

@@ -201,6 +201,25 @@ TEST(Api, ACaptureWritesNoConstants) {
   EXPECT_EQ(station.post("/api/capture", {{"write", false}, {"operator", "Ada"}}), 202);
 }
 
+// A request with `Lane` started lane 1, whose motor turns.
+TEST(Api, AKeyThatIsNoneOfItsRouteStartsNothingAndIsNamed) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.wait_state(1, "idle");
+  for (const char* path :
+       {"session", "operator", "code", "run", "capture", "scan", "check", "check-units",
+        "station-lock", "repair", "repair/cancel", "runs/0123456789abcdef0123456789abcdef/print",
+        "lanes/1/undo", "lanes/1/stop", "lanes/1/placed", "lanes/1/jig-free", "lanes/1/take",
+        "lanes/1/scan", "lanes/1/hand"}) {
+    const auto answer =
+        station.client().Post(std::string("/api/") + path, R"({"Lane": 2})", "application/json");
+    EXPECT_EQ(answer->status, 400) << path;
+    EXPECT_THAT(answer->body, HasSubstr("'Lane' is no key of this request")) << path;
+  }
+  EXPECT_EQ(station.post("/api/nothing", {{"Lane", 2}}), 404);
+  EXPECT_EQ(station.lane(1)["state"], "idle");
+}
+
 // Where the machine has operators, a name comes from a PIN and not from the request.
 TEST(Api, TheNameInARecordIsTheOneThatSignedIn) {
   const tests::TemporaryFolder folder;
@@ -209,10 +228,10 @@ TEST(Api, TheNameInARecordIsTheOneThatSignedIn) {
   EXPECT_OK(operators.add("Ada", OperatorRole::technician, "471100"));
   station.wait_state(1, "idle");
   const Json mallory = {{"operator", "Mallory"}};
-  for (const char* path :
-       {"/api/run", "/api/capture", "/api/lanes/1/take", "/api/lanes/1/jig-free"}) {
+  for (const char* path : {"/api/run", "/api/capture", "/api/lanes/1/take"}) {
     EXPECT_EQ(station.post(path, mallory), 403) << path;
   }
+  EXPECT_EQ(station.post("/api/lanes/1/jig-free", Json::object()), 403);
   EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", "0000"}}), 403);
   EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}}), 403);
   EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", 471100}}), 400);

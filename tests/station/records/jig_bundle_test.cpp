@@ -35,6 +35,10 @@ TEST(JigBundle, AStoredRunIsDiagnosed) {
     mismatch = mismatch || hidden["name"] == "filter_mismatch";
   }
   EXPECT_TRUE(mismatch) << "raw counts do not show it";
+  EXPECT_EQ(json["bundle"], "run " + run);
+  EXPECT_THAT(
+      tests::run_command(posix_env(), {"gap", "diagnose", "--run", run, "--store", store}).out,
+      testing::StartsWith("run " + run.substr(0, 12) + ": "));
   EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", "--run", "00ff", "--store", store})
                 .exit_code,
             66);

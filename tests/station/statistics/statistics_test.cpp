@@ -53,10 +53,16 @@ TEST(Capability, NistsExample) {
   EXPECT_NEAR(found->cpk, 0.6667, 5e-5);
 }
 
-TEST(Capability, NeedsScatterAndALimit) {
-  EXPECT_FALSE(capability({1}, 0, 2));
-  EXPECT_FALSE(capability({1, 1, 1}, 0, 2));
-  EXPECT_FALSE(capability({1, 2}, std::nullopt, std::nullopt));
+// The rows of the table of capability().
+TEST(Capability, NeedsFiveValuesScatterAndALimit) {
+  EXPECT_FALSE(capability({}, 0, 2));
+  EXPECT_FALSE(capability({1, 2, 3, 4}, 0, 9));
+  EXPECT_FALSE(capability({1, 1, 1, 1, 1}, 0, 2));
+  EXPECT_FALSE(capability({1, 2, 3, 4, 5}, std::nullopt, std::nullopt));
+  const auto one = capability({1, 2, 3, 4, 5}, std::nullopt, 9);
+  ASSERT_TRUE(one);
+  EXPECT_FALSE(one->cp);
+  EXPECT_TRUE(capability({1, 2, 3, 4, 5}, 0, 9)->cp);
 }
 
 // --- yields ---
@@ -129,7 +135,7 @@ TEST(Statistics, CapabilityIsOfUnitsAndNotOfTheirRepeats) {
 }
 
 // The rows of the table of statistics(). Oracle: Cpk by hand, (high - mean) / (3 sd) of the values
-// 4, 5 and 6: mean 5, sd 1; the built-in limit is 10.
+// 4 to 8: mean 6, variance 2.5; the built-in limit is 10.
 TEST(Statistics, CapabilityGoesByTheLimitsThatAreNamedOrByThoseOfAllRuns) {
   const auto runs_with = [](const std::vector<double>& highs) {
     std::vector<RunSummary> runs;
@@ -145,15 +151,17 @@ TEST(Statistics, CapabilityGoesByTheLimitsThatAreNamedOrByThoseOfAllRuns) {
   };
   const Limits limits = default_limits();
   ASSERT_EQ(limits.of("noise_mg").high, 10);
-  for (const std::vector<double>& highs : {std::vector<double>{8, 8, 8}, {8, 8, 11}, {11, 8, 8}}) {
+  for (const std::vector<double>& highs :
+       {std::vector<double>{12, 12, 12, 12, 12}, {12, 12, 12, 12, 15}, {15, 12, 12, 12, 12}}) {
     const auto by_given = statistics(runs_with(highs), "", &limits);
-    EXPECT_NEAR(cpk(by_given), 5.0 / 3, 1e-12);
+    EXPECT_NEAR(cpk(by_given), 4 / (3 * std::sqrt(2.5)), 1e-12);
     EXPECT_TRUE(by_given->limits_differ.empty());
   }
-  const auto by_shared = statistics(runs_with({8, 8, 8}), "");
-  EXPECT_NEAR(cpk(by_shared), 1, 1e-12);
+  const auto by_shared = statistics(runs_with({12, 12, 12, 12, 12}), "");
+  EXPECT_NEAR(cpk(by_shared), 6 / (3 * std::sqrt(2.5)), 1e-12);
   EXPECT_TRUE(by_shared->limits_differ.empty());
-  for (const std::vector<double>& highs : {std::vector<double>{8, 8, 11}, {11, 8, 8}}) {
+  for (const std::vector<double>& highs :
+       {std::vector<double>{12, 12, 12, 12, 15}, {15, 12, 12, 12, 12}}) {
     const auto differing = statistics(runs_with(highs), "");
     EXPECT_TRUE(differing->capabilities.empty());
     EXPECT_EQ(differing->limits_differ, std::vector<std::string>{"noise_mg x"});
