@@ -64,14 +64,13 @@ Status refuse_record(FileSystem& files, const std::string& folder) {
              : Status();
 }
 
-}  // namespace
-
-Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder,
-                                                  const std::vector<std::string>& inputs) {
-  SIXPOINT_CHECK(refuse_record(files, folder));
+Status refuse_folder_of_inputs(FileSystem& files, const std::string& folder,
+                               const std::vector<std::string>& inputs) {
   const auto output = files.real_path(folder);
   for (const std::string& input : inputs) {
-    if (const auto real = files.real_path(input); output && real && *real == *output) {
+    const auto info = files.info(input);
+    const auto real = files.real_path(info && info->is_folder ? input : folder_of(input));
+    if (info && real && *real == *output) {
       return fail(ErrorCode::usage, "the output folder is the folder of the recordings", folder,
                   "choose another one; a folder below it will do");
     }
@@ -79,6 +78,15 @@ Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::
   SIXPOINT_CHECK(make_synced_folders(files, folder));
   auto lock = files.lock(repair_lock_in(folder));
   if (!lock) {
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder,
+                                                  const std::vector<std::string>& inputs) {
+  SIXPOINT_CHECK(refuse_record(files, folder));
+  SIXPOINT_CHECK(refuse_folder_of_inputs(files, folder, inputs));
     return nullptr;
   }
   if (*lock == nullptr || a_shard_is_at_work(files, folder)) {
