@@ -20,6 +20,8 @@
 #include "repair/rescale/gate.h"
 #include "repair/rescale/repair_mark.h"
 #include "repair/rescale/rescaled_log.h"
+#include "repair/triage/file_tree.h"
+#include "repair/triage/scan_file.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -127,8 +129,12 @@ class Repair {
 
   Status work() {
     if (!survey_and_write()) {
-      SIXPOINT_ASSIGN(survey_,
-                      survey(env_.files, report_.input, options_.still, {options_.salvage, {}}));
+      auto surveyed = survey(env_.files, report_.input, options_.still, {options_.salvage, {}});
+      if (!surveyed) {
+        return has_ending(report_.input, ".agd") ? answer_for_epochs()
+                                                 : Status(fail(surveyed.error()));
+      }
+      survey_ = *std::move(surveyed);
     }
     report_.losses = survey_.losses;
     report_.serial = survey_.facts.serial;
@@ -170,6 +176,22 @@ class Repair {
 
   // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
   Status survey_and_write() {
+  // An .agd holds no samples: what scan says of it. The verdict stays empty: no constants help it,
+  // so its unit waits for none.
+  Status answer_for_epochs() {
+    ScannedFile scanned = scan_file(env_.files, report_.input);
+    if (scanned.error) {
+      return fail(*std::move(scanned.error));
+    }
+    report_.serial = scanned.facts.serial;
+    report_.calibration_time = scanned.facts.calibration_time;
+    report_.reasons = std::move(scanned.reasons);
+    report_.status = scanned.verdict == to_string(Verdict::not_affected)
+                         ? RepairStatus::not_affected
+                         : RepairStatus::not_repairable;
+    return {};
+  }
+
     const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
     // How large a log of wide records becomes is known at its end only, and its entry is to say it
     // before: all would be written twice.
