@@ -40,6 +40,8 @@ constexpr const char* kNotDecided =
 constexpr const char* kNotUndone =
     "the file's own constants cannot be undone, so no other constants help: without them its "
     "samples cannot be put right";
+constexpr const char* kOfPrior =
+    "the constants rest on a population prior (--allow-prior), not on this unit's data alone";
 constexpr const char* kDoneBefore = "repaired by an earlier run";
 constexpr const char* kMadeOtherwise =
     "the output that is there was made with other constants, options or rules than would be used "
@@ -307,6 +309,9 @@ class Repair {
       return {};
     }
     take_chosen(*std::move(choice.chosen));
+    if (report_.source->from_prior) {
+      report_.reasons.emplace_back(kOfPrior);
+    }
     return {};
   }
 

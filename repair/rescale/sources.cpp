@@ -81,7 +81,8 @@ std::string digest_of(const calib::ConstantsRecord& record) {
 
 SourceUsed source_used(const std::string& kind, const std::string& id,
                        const calib::ConstantsRecord& record) {
-  SourceUsed used{kind, id.empty() ? digest_of(record) : id, std::nullopt, std::nullopt};
+  SourceUsed used{kind, id.empty() ? digest_of(record) : id, std::nullopt, std::nullopt,
+                  record.from_prior};
   if (record.made_at != UtcTime{}) {
     used.made_at = record.made_at;
   }
@@ -112,6 +113,7 @@ nlohmann::ordered_json SourceUsed::to_json() const {
 }
 
 std::optional<SourceUsed> parse_source_used(const nlohmann::ordered_json& json) {
+  json["from_prior"] = from_prior;
   const auto text = [&](const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -119,7 +121,8 @@ std::optional<SourceUsed> parse_source_used(const nlohmann::ordered_json& json) 
   if (!json.is_object() || text("kind").empty()) {
     return std::nullopt;
   }
-  SourceUsed used{text("kind"), text("id"), std::nullopt, std::nullopt};
+  SourceUsed used{text("kind"), text("id"), std::nullopt, std::nullopt,
+                  json.value("from_prior", nlohmann::ordered_json()) == true};
   if (const auto made_at = parse_iso8601(text("made_at")); made_at) {
     used.made_at = *made_at;
   }

@@ -75,6 +75,7 @@ struct SourceUsed {
   std::optional<double> standard_uncertainty_mg;
 
   std::string brief() const;  // "store 5c0f91aa (2026-11-22, +- 1.2 mg)"
+  bool from_prior = false;  // they rest on a population prior: --allow-prior
   nlohmann::ordered_json to_json() const;
 };
 // `id`: in the store, or empty.

@@ -496,6 +496,26 @@ Bytes log_with(const MadeRecording& made, const Bytes& parameters) {
   const Bytes whole = made.log();
   log.insert(
       log.end(),
+// An answer that rests on other units says so, in words and for programs.
+TEST_F(RepairFile, ConstantsOfAPriorAreSaidWhereTheyAreUsed) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  const std::string why =
+      "the constants rest on a population prior (--allow-prior), not on this unit's data alone";
+  EXPECT_THAT(repair().reasons, testing::Not(testing::Contains(why)));
+  EXPECT_EQ(repair().to_json()["source"]["from_prior"], false);
+  ASSERT_OK(memory_.files.remove("out.gt3x"));
+  source_.choice.chosen->record.from_prior = true;
+  RepairOptions allowed;
+  allowed.allow_prior = true;
+  const RepairReport report = repair(allowed);
+  ASSERT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_THAT(report.reasons, testing::Contains(why));
+  EXPECT_EQ(report.to_json()["source"]["from_prior"], true);
+  EXPECT_TRUE(parse_source_used(report.to_json()["source"]).value().from_prior);
+  allowed.resume = true;
+  EXPECT_EQ(repair(allowed).to_json()["source"]["from_prior"], true) << "as its mark says";
+}
+
       whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
       whole.end());
   return log;
