@@ -67,6 +67,9 @@ Status refuse_record(FileSystem& files, const std::string& folder) {
 Status refuse_folder_of_inputs(FileSystem& files, const std::string& folder,
                                const std::vector<std::string>& inputs) {
   const auto output = files.real_path(folder);
+  if (!output) {
+    return {};  // it is not there yet
+  }
   for (const std::string& input : inputs) {
     const auto info = files.info(input);
     const auto real = files.real_path(info && info->is_folder ? input : folder_of(input));
@@ -75,9 +78,6 @@ Status refuse_folder_of_inputs(FileSystem& files, const std::string& folder,
                   "choose another one; a folder below it will do");
     }
   }
-  SIXPOINT_CHECK(make_synced_folders(files, folder));
-  auto lock = files.lock(repair_lock_in(folder));
-  if (!lock) {
   return {};
 }
 
@@ -87,6 +87,9 @@ Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::
                                                   const std::vector<std::string>& inputs) {
   SIXPOINT_CHECK(refuse_record(files, folder));
   SIXPOINT_CHECK(refuse_folder_of_inputs(files, folder, inputs));
+  SIXPOINT_CHECK(make_synced_folders(files, folder));
+  auto lock = files.lock(repair_lock_in(folder));
+  if (!lock) {
     return nullptr;
   }
   if (*lock == nullptr || a_shard_is_at_work(files, folder)) {

@@ -357,6 +357,10 @@ class Repair {
       report_.reasons.emplace_back("--force: repaired all the same");
     }
     if (!answer.write || (report_.forced && !options_.force)) {
+      if (report_.refutes_constants || answer.row == GateRow::no_better) {
+        report_.reasons.push_back(
+            what_may_help(is_of_still_periods(report_.method), report_.sides.size()));
+      }
       report_.forced = false;
       return false;
     }

@@ -22,6 +22,10 @@ constexpr std::array<std::string_view, 5> kSourceNames = {"constants", "calibrat
 
 std::string_view to_string(SourceKind kind) { return kSourceNames[static_cast<std::size_t>(kind)]; }
 
+bool is_of_still_periods(std::string_view kind) {
+  return kind == to_string(SourceKind::scan) || kind == to_string(SourceKind::unit_files);
+}
+
 std::vector<SourceKind> sources_in_order(const NamedSources& named) {
   std::vector<SourceKind> order;
   if (named.constants) {
@@ -109,11 +113,11 @@ nlohmann::ordered_json SourceUsed::to_json() const {
     json["made_at"] = to_iso8601(*made_at);
   }
   json["standard_uncertainty_mg"] = calib::number_or_null(standard_uncertainty_mg);
+  json["from_prior"] = from_prior;
   return json;
 }
 
 std::optional<SourceUsed> parse_source_used(const nlohmann::ordered_json& json) {
-  json["from_prior"] = from_prior;
   const auto text = [&](const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
