@@ -123,7 +123,7 @@ class Repair {
     SIXPOINT_ASSIGN(const FileInfo now, env_.files.info(report_.input));
     if (now.size != before_.size || now.modified_ns != before_.modified_ns ||
         now.device != before_.device || now.inode != before_.inode) {
-      return fail(ErrorCode::bad_data, "the file changed while it was repaired", report_.input,
+      return fail(ErrorCode::bad_data, kChangedMeanwhile, report_.input,
                   "find out what writes to it, and repair it again");
     }
     return {};
@@ -176,8 +176,6 @@ class Repair {
     return write();
   }
 
-  // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
-  Status survey_and_write() {
   // An .agd holds no samples: what scan says of it. The verdict stays empty: no constants help it,
   // so its unit waits for none.
   Status answer_for_epochs() {
@@ -194,6 +192,8 @@ class Repair {
     return {};
   }
 
+  // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
+  Status survey_and_write() {
     const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
     // How large a log of wide records becomes is known at its end only, and its entry is to say it
     // before: all would be written twice.
@@ -488,7 +488,7 @@ class Repair {
                ? fail(ErrorCode::cannot_create, "this is a link to the recording itself", output_,
                       "remove the link, or choose another output folder")
                : fail(ErrorCode::cannot_create, "this is the recording itself", output_,
-                      "choose another output folder");
+                      kAnotherFolder);
   }
 
   Status write() {
