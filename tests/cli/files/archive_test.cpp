@@ -162,6 +162,15 @@ TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {
   for (const Json& shard : shards) {
     EXPECT_TRUE(shard["rerun"].is_null()) << shard;
   }
+  // So are files that are gone.
+  std::filesystem::remove(archive_ + "/plain.gt3x");
+  run_shard(0);
+  run_shard(1);
+  const Answer gone = run({"archive", "merge", plan_});
+  EXPECT_EQ(gone.exit_code, 66);
+  EXPECT_THAT(gone.people, HasSubstr("changed since the plan was made, or are gone"));
+  EXPECT_THAT(gone.people, HasSubstr("make another plan"));
+  EXPECT_THAT(gone.people, testing::Not(HasSubstr("archive run")));
   // A result that is damaged is another matter.
   std::ofstream(plan_ + "/results/00000.jsonl", std::ios::app) << "x";
   EXPECT_THAT(run({"archive", "merge", plan_}).people,
@@ -172,6 +181,25 @@ TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {
   EXPECT_THAT(damaged.people, HasSubstr("shard 0: its list of "));
   EXPECT_THAT(damaged.people, HasSubstr("make another plan"));
   EXPECT_THAT(damaged.people, testing::Not(HasSubstr("archive run")));
+}
+
+// The command that runs it would be refused (73) as long as it runs.
+TEST_F(ArchiveCommand, ForAShardThatIsRunningTheMergeSaysToWait) {
+  fill();
+  plan({"--shards", "3"});
+  const Json before = merge().json()["shards"];
+  std::filesystem::create_directories(plan_ + "/results");
+  const auto held = files_.lock(plan_ + "/results/00000.lock");
+  ASSERT_OK(held);
+  const Answer words = run({"archive", "merge", plan_});
+  EXPECT_EQ(words.exit_code, 2);
+  EXPECT_THAT(words.people, HasSubstr("shard 0 is running (0 of "));
+  EXPECT_THAT(words.people, HasSubstr("files): wait for it\n"));
+  EXPECT_THAT(words.people, testing::Not(HasSubstr("--shard 0 ")));
+  EXPECT_THAT(words.people, HasSubstr("or all of them: sbatch --array=1,2 "));
+  const Json shards = merge().json()["shards"];
+  EXPECT_FALSE(before[0]["rerun"].is_null());
+  EXPECT_TRUE(shards[0]["rerun"].is_null());
 }
 
 TEST_F(ArchiveCommand, AnOutputThatWasTouchedIsRemovedBeforeTheRunIsAdvised) {
