@@ -393,8 +393,9 @@ TEST_F(RepairCommand, AnAgdIsToBeMadeAgain) {
   const auto folder = run({"repair", archive_, "-o", out_, "--scan", "--json"});
   EXPECT_EQ(folder.exit_code, 0);
   EXPECT_EQ(folder.json()["summary"]["files"], 2) << "of a folder, recordings";
-  tests::make_agd(agd, "NEO1C15110001", "1.5.0");
-  EXPECT_EQ(run({"repair", agd, "-o", out_, "--scan"}).exit_code, 0) << "not affected";
+  tests::make_agd(archive_ + "/other.agd", "NEO1C15110001", "1.5.0");
+  EXPECT_EQ(run({"repair", archive_ + "/other.agd", "-o", out_, "--scan"}).exit_code, 0)
+      << "not affected";
 }
 
 // A file that would not be written now, and an earlier run's output of it: both are said.

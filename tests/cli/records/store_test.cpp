@@ -45,7 +45,7 @@ TEST_F(StoreTest, WithdrawnConstantsRecallTheirFiles) {
   EXPECT_EQ(run({"store", "recall", "--store", path("a.db"), "--json"}).json()["files"].size(), 0U);
   EXPECT_THAT(run({"store", "recall", "--store", path("a.db")}).people,
               HasSubstr("no file was repaired with constants that were withdrawn"));
-  EXPECT_EQ(run({"store", "due", "--days", "20000", "--store", path("a.db")}).people,
+  EXPECT_EQ(run({"store", "due", "--days", "30000", "--store", path("a.db")}).people,
             "no unit is due\n");
   EXPECT_EQ(run({"store", "withdraw", id, "--store", path("a.db")}).exit_code, 64) << "no reason";
   const auto withdrawn = run({"store", "withdraw", id, "--reason", "out of level", "--operator",
