@@ -40,8 +40,8 @@ Result<PerAxis<T>> read_axes(const Json& parent, const char* key) {
   const std::string where = fmt::format("constants.json, {}", key);
   const auto found = parent.find(key);
   if (found == parent.end() || !found->is_array() || found->size() != kAxes) {
-    return fail(ErrorCode::bad_data, "is not an array of three numbers, X Y Z", where,
-                "write the file with sixpoint");
+    return fail(ErrorCode::bad_data, fmt::format("{} is not an array of three numbers, X Y Z", key),
+                where, "write the file with sixpoint");
   }
   PerAxis<T> out{};
   for (std::size_t a = 0; a < kAxes; ++a) {

@@ -30,7 +30,7 @@ Result<ParameterSet> parse_numbers_of(const Section& effect, std::string_view ke
       }
     }
   }
-  SIXPOINT_ASSIGN(ParameterSet complete, complete_parameters(kind, given));
+  SIXPOINT_ASSIGN(ParameterSet complete, parameters_at(effect.path(key), kind, given));
   if (!spread) {
     SIXPOINT_CHECK(check_possible(kind, complete, effect.path(key)));
   } else {
@@ -62,7 +62,7 @@ Result<std::vector<PopulationEffect>> parse_population(const Json& json) {
     std::optional<std::string> name;
     SIXPOINT_CHECK(effect.text("name", name, 60));
     PopulationEffect parsed;
-    SIXPOINT_ASSIGN(parsed.kind, find_effect(name.value_or("")));
+    SIXPOINT_ASSIGN(parsed.kind, effect_at(effect.path("name"), name.value_or("")));
     if (std::ranges::any_of(population, [&](const auto& p) { return p.kind == parsed.kind; })) {
       return wrong(effect.path("name"), "this effect stands here twice");
     }

@@ -307,7 +307,7 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
   std::optional<std::string> name;
   SIXPOINT_CHECK(effect.text("name", name, 60));
   EffectSpec spec;
-  SIXPOINT_ASSIGN(spec.kind, find_effect(name.value_or("")));
+  SIXPOINT_ASSIGN(spec.kind, effect_at(effect.path("name"), name.value_or("")));
   ParameterSet given;
   if (const Json* parameters = effect.find("parameters"); parameters != nullptr) {
     if (!parameters->is_object()) {
@@ -318,7 +318,7 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
                       parse_numbers(value, fmt::format("{}/{}", effect.path("parameters"), key)));
     }
   }
-  SIXPOINT_ASSIGN(spec.values, complete_parameters(*spec.kind, given));
+  SIXPOINT_ASSIGN(spec.values, parameters_at(effect.path("parameters"), *spec.kind, given));
   SIXPOINT_CHECK(check_possible(*spec.kind, spec.values, effect.path("parameters")));
   return spec;
 }

@@ -37,6 +37,25 @@ inline tl::unexpected<Error> wrong(const std::string& path, std::string what) {
               "docs/scenario.md describes every key");
 }
 
+// find_effect() and complete_parameters(), whose errors know no path.
+inline Result<const EffectKind*> effect_at(const std::string& path, std::string_view name) {
+  auto kind = find_effect(name);
+  if (!kind) {
+    kind.error().where = wrong(path, {}).value().where;
+  }
+  return kind;
+}
+inline Result<ParameterSet> parameters_at(const std::string& path, const EffectKind& kind,
+                                          const ParameterSet& given) {
+  for (const auto& one : given) {
+    if (auto alone = complete_parameters(kind, {one}); !alone) {
+      alone.error().where = wrong(fmt::format("{}/{}", path, one.first), {}).value().where;
+      return alone;
+    }
+  }
+  return complete_parameters(kind, given);
+}
+
 // Refers to the JSON, which must outlive it.
 class Section {
  public:

@@ -149,14 +149,18 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
           shard.files);
     } else if (shard.changed > 0) {
       context.people << fmt::format(
-          "shard {}: {} of its {} files changed since the plan was made\n", shard.shard,
-          shard.changed, shard.files);
+          "shard {}: {} of its {} files changed since the plan was made, or are gone\n",
+          shard.shard, shard.changed, shard.files);
     }
     if (shard.touched > 0) {
       context.people << fmt::format(
           "shard {}: outputs of {} of its {} files are not as it wrote them, or cannot be read, "
           "and no run replaces them: look at them, remove what is wrong, then: {}\n",
           shard.shard, shard.touched, shard.files, rerun.shard(shard.shard));
+    }
+    if (shard.state == repair::ShardState::running) {
+      context.people << fmt::format("shard {} is running ({} of {} files): wait for it\n",
+                                    shard.shard, shard.files_done, shard.files);
     }
     if (!shard.wants_rerun()) {
       continue;
@@ -171,14 +175,14 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
                                          repair::to_string(shard.state), shard.files_done,
                                          shard.files, rerun.shard(shard.shard)));
   }
+  if (again.size() > 1) {
+    context.people << fmt::format("or all of them: {}\n", rerun.array(again));
+  }
   if (another_plan) {
     context.people
         << "make another plan ('sixpoint archive plan' into another folder), which "
            "takes files as they are now, and run it into the same output folder: what is "
            "repaired already is left as it is\n";
-  }
-  if (again.size() > 1) {
-    context.people << fmt::format("or all of them: {}\n", rerun.array(again));
   }
 }
 

@@ -89,7 +89,7 @@ std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files,
 }
 
 // The command line that goes on with this run.
-std::string line_that_goes_on(const RepairCommandOptions& options) {
+std::string line_that_goes_on(const RepairCommandOptions& options, bool salvage) {
   std::string line = "sixpoint repair";
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) {
@@ -112,7 +112,7 @@ std::string line_that_goes_on(const RepairCommandOptions& options) {
                                     {" --store-only", how.store_only},
                                     {" --undo-rotation", how.undo_rotation},
                                     {" --allow-prior", how.allow_prior},
-                                    {" --salvage", how.salvage},
+                                    {" --salvage", salvage},
                                     {" --force", how.force},
                                     {" --redo-outdated", how.redo_outdated},
                                     {" --report", options.report}}) {
@@ -139,21 +139,49 @@ Status leave_in_folder(const RepairCommandOptions& options,
                         : Status();
 }
 
+// True where files failed. A command only where it can do one of them (next_run()).
+bool say_what_failed(const RepairCommandOptions& options, const std::vector<RepairReport>& reports,
+                     Context& context) {
+  std::size_t failed = 0;
+  std::size_t helped = 0;
+  bool salvage = options.repair.salvage;
+  for (const RepairReport& report : reports) {
+    if (report.status != RepairStatus::failed) {
+      continue;
+    }
+    ++failed;
+    const repair::NextRun next =
+        repair::next_run(report.error.value_or(Error{}), options.repair.salvage);
+    helped += next != repair::NextRun::none ? 1 : 0;
+    salvage = salvage || next == repair::NextRun::with_salvage;
+  }
+  if (failed > 0 && helped == 0) {
+    context.people << fmt::format(
+        "next: {} of the files failed; do what their lines say: no run of this command repairs "
+        "them\n",
+        failed);
+  } else if (failed > 0) {
+    const std::string which =
+        helped == failed ? "" : fmt::format("; another run can repair {} of them", helped);
+    context.people << fmt::format(
+        "next: {} of the files failed{}; do what their lines say, then go on:\n  {}\n", failed,
+        which, line_that_goes_on(options, salvage));
+  }
+  return failed > 0;
+}
+
 // The command that comes next, or that goes on where this run was stopped.
 void say_what_is_next(const RepairCommandOptions& options, const std::vector<RepairReport>& reports,
                       std::size_t files, Context& context) {
   if (reports.size() < files) {
     context.worsen(kExitStopped);
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
-                                  reports.size(), files, line_that_goes_on(options));
+                                  reports.size(), files,
+                                  line_that_goes_on(options, options.repair.salvage));
     return;
   }
-  const auto failed = std::ranges::count(reports, RepairStatus::failed, &RepairReport::status);
-  if (failed > 0) {  // impact refuses a pair that does not belong together
-    context.people << fmt::format(
-        "next: {} of the files failed; do what their lines say, then go on:\n  {}\n", failed,
-        line_that_goes_on(options));
-    return;
+  if (say_what_failed(options, reports, context)) {
+    return;  // impact refuses a pair that does not belong together
   }
   const auto asked = context.env.files.info(options.paths.front());
   if (options.paths.size() == 1 && asked && asked->is_folder && !options.repair.dry_run &&

@@ -56,6 +56,7 @@ struct Outcome {
   std::optional<SavedConstants> saved;
   std::optional<Error> not_kept = std::nullopt;  // why not, where it was asked for
   bool is_lent = true;                           // why_not_lent() (repair/rescale/gate.h)
+  bool repairs_files = true;                     // why_legacy_repairs_none(), in the same header
 };
 
 // Writes the constants to the file and the store that the options name:
@@ -109,6 +110,7 @@ Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& op
   outcome.report.seconds =
       std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
   outcome.is_lent = repair::why_not_lent(survey).empty();
+  outcome.repairs_files = repair::why_legacy_repairs_none(survey.facts).empty();
   if (const Status kept = keep(path, options, survey, outcome, context, outputs); !kept) {
     outcome.not_kept = kept.error();
   }
@@ -165,7 +167,7 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
   } else if (report.usable() && report.filter && !report.serial.empty() &&  // record_of()
-             outcome.is_lent && !outcome.not_kept) {
+             outcome.is_lent && outcome.repairs_files && !outcome.not_kept) {
     next_step(context, options.json, {"solve", path_word(path), "--save"});
   }
 }

@@ -106,7 +106,13 @@ Result<Judged> diagnose(const GapCommandOptions& options, Context& context) {
   how.seed = options.seed;
   if (!options.population.empty()) {
     SIXPOINT_ASSIGN(const Bytes scenario, read_file(context.env.files, options.population));
-    SIXPOINT_ASSIGN(how.learnt, gap::learnt_sizes(as_text(scenario)));
+    auto learnt = gap::learnt_sizes(as_text(scenario));
+    if (!learnt) {
+      Error error = std::move(learnt).error();
+      error.where = printable(options.population) + ": " + error.where;
+      return fail(std::move(error));
+    }
+    how.learnt = *std::move(learnt);
   }
   SIXPOINT_ASSIGN(Judged answer, diagnose_input(options, std::move(how), context));
   answer.diagnosis.seconds =

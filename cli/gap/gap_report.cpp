@@ -26,8 +26,8 @@ std::string progress_text(const gap::GapProgress& progress) {
   for (const gap::EffectProgress& effect : progress.effects) {
     text += effect.scatter
                 ? fmt::format("  {:<20} scatter, which can't be predicted\n", effect.name)
-                : fmt::format("  {:<20} closes {:5.1f} %  ({:.2f} mg without it)\n", effect.name,
-                              100 * effect.closed_fraction, effect.without_mg);
+                : fmt::format("  {:<20} closes: {}  ({:.2f} mg without it)\n", effect.name,
+                              effect.closed.text(), effect.without_mg);
   }
   for (const gap::BundleProgress& bundle : progress.bundles) {
     text += fmt::format("  {}: {:.2f} mg -> {:.2f} mg, floor {:.2f} mg{}{}\n",

@@ -64,6 +64,9 @@ void print_gap_score(const gap::BenchmarkScores& scores, Context& context) {
 }
 
 Status run_gap_score(const GapScoreCommandOptions& options, Context& context) {
+  if (options.answers.empty()) {
+    return fail(ErrorCode::usage, "ANSWERS is required", {}, "name the file or folder of answers");
+  }
   FileSystem& files = context.env.files;
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.labels));
   SIXPOINT_ASSIGN(const gap::Labels labels, gap::parse_labels(as_text(text)));
@@ -90,10 +93,10 @@ void add_gap_score(CLI::App& gap_command, Context& context) {
   auto [command, options] = add_command<GapScoreCommandOptions>(
       gap_command, context, "gap-score", "score",
       "scores any program's answers to an exported challenge", run_gap_score);
-  command
-      .add_option("ANSWERS,--answers", options.answers,
-                  "a JSON Lines file, or a folder with NAME.json for each bundle NAME")
-      ->required();
+  command.add_option(
+      "ANSWERS,--answers", options.answers,
+      "a JSON Lines file, or a folder with NAME.json for each bundle NAME; needed, in "
+      "one of the two ways");
   command.add_option("--labels", options.labels, "the labels that gap challenge --export wrote")
       ->required();
   command.add_option("--seed", options.seed, "of the bootstrap");

@@ -255,7 +255,8 @@ void print_people(const station::GapTrends& trends, bool lots_known, Context& co
                     std::abs(run.lean_deg), printable(run.jig, 60)));
   }
   if (trends.jigs.empty()) {
-    lines.emplace_back("the store holds no jig run with six faces");
+    lines.emplace_back(
+        "the store holds no jig run with six faces (runs of gage studies are not looked at)");
   } else if (!lots_known) {
     lines.emplace_back(
         "the store knows no lots: what units of one lot share can count as a jig's "

@@ -96,6 +96,10 @@ Result<Json> simulate(Context& context, const SimulateCommandOptions& options) {
     SIXPOINT_CHECK(truth_file->commit());
   }
 
+  if (!options.output.ends_with(".gt3x") && !options.output.ends_with(".GT3X")) {
+    context.log().warn("{}: scan and repair of a folder look at names that end with .gt3x alone",
+                       printable(options.output));
+  }
   SIXPOINT_ASSIGN(Json json, answer_of(files, scenario, options.output));
   json["filter"]["in_force"] = calib::to_string(scenario.filter_in_force());
   json["filter"]["constants_measured_under"] =

@@ -210,6 +210,9 @@ Result<Answer> recall(const StoreCommandOptions& options, Context& context) {
                entry.repaired_again_at ? local_time(*entry.repaired_again_at) : "no",
                entry.repair.serial, printable(entry.reason), printable(entry.repair.input)});
   }
+  if (entries.empty()) {
+    answer.note = "no file was repaired with constants that were withdrawn since";
+  }
   answer.text = table.text();
   return answer;
 }
@@ -281,6 +284,9 @@ Result<Answer> due(const StoreCommandOptions& options, Context& context) {
                     {"last_constants", value_or_null(unit.last_constants)}});
     table.row(
         {unit.serial, unit.model, unit.last_constants ? local_time(*unit.last_constants) : "none"});
+  }
+  if (units.empty()) {
+    answer.note = "no unit is due";
   }
   answer.text = table.text();
   return answer;

@@ -15,13 +15,8 @@ using Json = nlohmann::ordered_json;
 
 double square(double x) { return x * x; }
 
-// What is left below the floor is chance: no more than all is closed.
-double share_of_open(double closed_mg2, double open_mg2) {
-  return open_mg2 > 0 ? std::min(1.0, closed_mg2 / open_mg2) : 0;
-}
-
-double share_closed(double before_mg, double after_mg, double floor_mg) {
-  return share_of_open(square(before_mg) - square(after_mg), square(before_mg) - square(floor_mg));
+Json fraction_json(const Closed& closed) {
+  return closed.fraction ? Json(*closed.fraction) : Json(nullptr);
 }
 
 ProgressSum sum_of(const std::vector<const BundleProgress*>& bundles, std::size_t adoptions) {
@@ -45,7 +40,7 @@ ProgressSum sum_of(const std::vector<const BundleProgress*>& bundles, std::size_
     mg = std::sqrt(mg);
   }
   if (!sum.after_mg.empty()) {
-    sum.closed_fraction = share_closed(sum.before_mg, sum.after_mg.back(), sum.floor_mg);
+    sum.closed = closed_of(sum.before_mg, sum.after_mg.back(), sum.before_mg, sum.floor_mg);
   }
   return sum;
 }
@@ -58,17 +53,37 @@ Json sum_json(const ProgressSum& sum) {
           {"before_mg", sum.before_mg},
           {"after_mg", sum.after_mg},
           {"floor_mg", sum.floor_mg},
-          {"closed_fraction", sum.closed_fraction}};
+          {"closed_fraction", fraction_json(sum.closed)}};
 }
 
 }  // namespace
+
+std::string Closed::text() const {
+  if (fraction) {
+    return fmt::format("{:.1f} %", 100 * *fraction);
+  }
+  return wider_mg > 0 ? fmt::format("wider by {:.2f} mg", wider_mg) : "next to nothing was open";
+}
+
+Closed closed_of(double from_mg, double to_mg, double before_mg, double floor_mg) {
+  constexpr double kChance = 1.5;
+  if (to_mg > from_mg) {
+    return {std::nullopt, to_mg - from_mg};
+  }
+  if (!(before_mg > kChance * floor_mg)) {
+    return {};
+  }
+  const double open = square(before_mg) - square(floor_mg);
+  // What is left below the floor is chance: no more than all is closed.
+  return {std::min(1.0, (square(from_mg) - square(to_mg)) / open), 0};
+}
 
 ProgressRecorder::ProgressRecorder(ScenarioHistory history)
     : learnt_from_(std::move(history.documents)) {
   progress_.history = std::move(history.states);
   if (!progress_.history.empty()) {
     for (const sim::EffectSpec& effect : sim::mean_effects(progress_.history.back().population)) {
-      progress_.effects.push_back({effect.kind->name, is_scatter(effect.kind->name), 0, 0});
+      progress_.effects.push_back({effect.kind->name, is_scatter(effect.kind->name), 0, {}});
     }
   }
   without_mg_.resize(progress_.effects.size());
@@ -126,10 +141,10 @@ GapProgress ProgressRecorder::finish() const {
     }
     EffectProgress& effect = out.effects[i];
     effect.without_mg = std::sqrt(mean);
-    const double open = square(out.all.before_mg) - square(out.all.floor_mg);
-    effect.closed_fraction = share_of_open(mean - square(out.all.after_mg.back()), open);
+    effect.closed =
+        closed_of(effect.without_mg, out.all.after_mg.back(), out.all.before_mg, out.all.floor_mg);
   }
-  std::ranges::stable_sort(out.effects, std::greater<>(), &EffectProgress::closed_fraction);
+  std::ranges::stable_sort(out.effects, std::greater<>(), &EffectProgress::without_mg);
   return out;
 }
 
@@ -144,12 +159,12 @@ std::string GapProgress::brief() const {
   const ProgressSum& sum = new_ones.bundles > 0 ? new_ones : all;
   return fmt::format(
       "{} recordings{}: {:.2f} mg before, {:.2f} mg after {} adoption{} (floor "
-      "{:.2f} mg): {:.0f} % closed",
+      "{:.2f} mg): {}{}",
       sum.bundles,
       new_ones.bundles > 0 ? " from which the scenario did not learn"
                            : " from which the scenario learnt",
       sum.before_mg, sum.after_mg.back(), history.size(), history.size() == 1 ? "" : "s",
-      sum.floor_mg, 100 * sum.closed_fraction);
+      sum.floor_mg, sum.closed.text(), sum.closed.fraction ? " closed" : "");
 }
 
 Json GapProgress::to_json() const {
@@ -180,7 +195,7 @@ Json GapProgress::to_json() const {
     json["effects"].push_back({{"name", effect.name},
                                {"scatter", effect.scatter},
                                {"without_mg", effect.without_mg},
-                               {"closed_fraction", effect.closed_fraction}});
+                               {"closed_fraction", fraction_json(effect.closed)}});
   }
   json["losses"] = losses;
   return json;

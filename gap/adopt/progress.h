@@ -11,6 +11,7 @@
 // learnt and others are kept apart: only the others say what the next recording will show.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,14 +33,30 @@ struct BundleProgress {
   double floor_mg = 0;
 };
 
+// What was closed of the mean square before, above the floor (closed_of()):
+//
+// | the gap                                               | share     | in words                      |
+// |-------------------------------------------------------|-----------|-------------------------------|
+// | became wider                                          | none      | "wider by 5.62 mg"            |
+// | was within 1.5 times the floor before: what is open   | none      | "next to nothing was open"    |
+// | is chance                                             |           |                               |
+// | otherwise                                             | 1 at most | "97.1 %"                      |
+struct Closed {
+  std::optional<double> fraction;
+  double wider_mg = 0;
+
+  std::string text() const;
+};
+// From `from_mg` to `to_mg`, of what was open at `before_mg`.
+Closed closed_of(double from_mg, double to_mg, double before_mg, double floor_mg);
+
 // Root mean squares over recordings.
 struct ProgressSum {
   std::size_t bundles = 0;
   double before_mg = 0;
   std::vector<double> after_mg;
   double floor_mg = 0;
-  // Of the mean square above the floor, by the last adoption: 1 at most; negative where it does harm.
-  double closed_fraction = 0;
+  Closed closed;  // by the last adoption
 };
 
 struct EffectProgress {
@@ -47,9 +64,7 @@ struct EffectProgress {
   bool scatter = false;  // it can't be predicted, and closes nothing
   // The gap with everything of the last adoption but this effect.
   double without_mg = 0;
-  // What it closes of the mean square before, above the floor: 1 at most; negative where it does
-  // harm.
-  double closed_fraction = 0;
+  Closed closed;  // by this effect
 };
 
 struct GapProgress {

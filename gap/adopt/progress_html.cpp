@@ -121,8 +121,7 @@ std::string sums_table(const GapProgress& progress) {
     for (const double mg : sum.after_mg) {
       out += fmt::format("<td>{:.3f}</td>", mg);
     }
-    out += fmt::format("<td>{:.3f}</td><td>{:.0f} %</td></tr>", sum.floor_mg,
-                       100 * sum.closed_fraction);
+    out += fmt::format("<td>{:.3f}</td><td>{}</td></tr>", sum.floor_mg, sum.closed.text());
   };
   row("all", progress.all);
   row("from which the scenario did not learn", progress.new_ones);
@@ -138,9 +137,8 @@ std::string effects_table(const GapProgress& progress) {
     out += effect.scatter
                ? fmt::format("<tr><td>{}</td><td></td><td>scatter: it can't be predicted</td></tr>",
                              html_escaped(effect.name))
-               : fmt::format("<tr><td>{}</td><td>{:.3f}</td><td>{:.1f} %</td></tr>",
-                             html_escaped(effect.name), effect.without_mg,
-                             100 * effect.closed_fraction);
+               : fmt::format("<tr><td>{}</td><td>{:.3f}</td><td>{}</td></tr>",
+                             html_escaped(effect.name), effect.without_mg, effect.closed.text());
   }
   return out + "</table>";
 }

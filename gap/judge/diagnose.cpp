@@ -187,9 +187,13 @@ Diagnosis diagnose(const Request& request) {
 Result<Diagnosis> diagnose(const Bundle& bundle, const DiagnoseOptions& options) {
   for (const std::string& name : options.without) {
     if (find_entry(name) == nullptr) {
+      std::vector<std::string_view> names;
+      for (const CatalogueEntry& entry : catalogue()) {
+        names.push_back(entry.name);
+      }
       return fail(ErrorCode::usage,
                   fmt::format("the catalogue has no effect '{}'", printable(name, 60)), "--without",
-                  "sixpoint gap diagnose lists all names under `candidates`");
+                  fmt::format("use one of: {}", fmt::join(names, ", ")));
     }
   }
   return diagnose(Request{bundle, options});

@@ -431,11 +431,18 @@ std::vector<NextSegment> next_segments(const Request& request, unsigned abilitie
                                        const Explanation& explanation, const Findings& found,
                                        const Diagnosis& out) {
   Expectation expected(request, explanation);
+  // What list_not_observable() leaves out of a record without the unit's constants no segment shows.
+  const auto can_be_judged = [&](std::string_view effect) {
+    return !request.options.uncalibrated || effect != "filter_mismatch";
+  };
   std::vector<NextSegment> list;
   for (const Offer& offer : standard_offers()) {
     expected.plan(offer.pieces);
     Questions questions(offer, abilities, expected);
     for (const CatalogueEntry& entry : catalogue()) {
+      if (!can_be_judged(entry.name)) {
+        continue;
+      }
       const auto named = [&](const auto& f) { return f.name == entry.name; };
       const auto blind = std::find_if(out.not_observable.begin(), out.not_observable.end(),
                                       [&](const auto& n) { return n.first == entry.name; });
@@ -450,6 +457,9 @@ std::vector<NextSegment> next_segments(const Request& request, unsigned abilitie
     for (const EffectFinding& e : found.effects) {
       for (const std::string& other : e.confounded_with) {
         const CatalogueEntry* entry = find_entry(other);
+        if (!can_be_judged(other)) {
+          continue;
+        }
         if (entry != nullptr && !explanation.best().contains(other)) {
           questions.add_either(e.name, *entry);
         } else if (entry != nullptr && (!found.accepted(other) || e.name < other)) {  // once

@@ -38,13 +38,17 @@ struct MergedShard {
   //
   // | the shard                                                   | wants a rerun |
   // |-------------------------------------------------------------|---------------|
+  // | some run is at work on it                                   | no: wait      |
   // | is not done, its list of files is as the plan wrote it      | yes           |
   // | ... was changed or is gone                                  | no            |
   // | is done, and files failed                                   | yes           |
-  // | ... because they changed since the plan was made            | no            |
+  // | ... because they changed since the plan was made, or are    | no            |
+  // |     gone                                                    |               |
   // | ... because their outputs are there and not as it wrote them| no: a run     |
   // |     (a person looks at them and removes them first)         | replaces none |
-  bool wants_rerun() const { return complete() ? failed > changed + touched : !plan_damaged; }
+  bool wants_rerun() const {
+    return complete() ? failed > changed + touched : state != ShardState::running && !plan_damaged;
+  }
   bool wants_another_plan() const { return plan_damaged || changed > 0; }
   bool complete() const { return state == ShardState::done; }
 };

@@ -21,6 +21,7 @@ namespace {
 
 // Results keep it: has_changed_since_plan() knows it again.
 constexpr const char* kChangedSincePlan = "the file changed since the plan was made";
+constexpr const char* kGoneSincePlan = "the file is gone since the plan was made: ";
 
 using Json = nlohmann::ordered_json;
 
@@ -231,7 +232,7 @@ class ShardRun {
     if (!before) {
       Error error = before.error();
       if (error.code == ErrorCode::no_input) {
-        error.what = "the file is gone since the plan was made: " + error.what;
+        error.what = kGoneSincePlan + error.what;
       }
       return failed_report(input, error);
     }
@@ -309,7 +310,8 @@ Result<ShardResult> run_shard(Env& env, const std::string& folder, const Archive
 
 bool has_changed_since_plan(const RepairReport& report) {
   return report.status == RepairStatus::failed && report.error &&
-         report.error->what == kChangedSincePlan;
+         (report.error->what == kChangedSincePlan ||
+          report.error->what.starts_with(kGoneSincePlan));
 }
 
 Result<std::optional<std::string>> output_folder_of(FileSystem& files, const std::string& folder) {

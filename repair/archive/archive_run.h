@@ -58,8 +58,8 @@ struct ShardRunOptions {
 Result<ShardResult> run_shard(Env& env, const std::string& folder, const ArchivePlan& plan,
                               const ShardRunOptions& options);
 
-// Whether the file failed because it is not as it was when the plan was made: only another plan
-// takes it.
+// Whether the file failed because it is not as it was when the plan was made, or is gone: only another
+// plan is without it, or takes it as it is.
 bool has_changed_since_plan(const RepairReport& report);
 
 // The output folder of the plan's runs; nothing before the first.

@@ -64,18 +64,29 @@ Status refuse_record(FileSystem& files, const std::string& folder) {
              : Status();
 }
 
+Status refuse_folder_of_inputs(FileSystem& files, const std::string& folder,
+                               const std::vector<std::string>& inputs) {
+  const auto output = files.real_path(folder);
+  if (!output) {
+    return {};  // it is not there yet
+  }
+  for (const std::string& input : inputs) {
+    const auto info = files.info(input);
+    const auto real = files.real_path(info && info->is_folder ? input : folder_of(input));
+    if (info && real && *real == *output) {
+      return fail(ErrorCode::usage, "the output folder is the folder of the recordings", folder,
+                  "choose another one; a folder below it will do");
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder,
                                                   const std::vector<std::string>& inputs) {
   SIXPOINT_CHECK(refuse_record(files, folder));
-  const auto output = files.real_path(folder);
-  for (const std::string& input : inputs) {
-    if (const auto real = files.real_path(input); output && real && *real == *output) {
-      return fail(ErrorCode::usage, "the output folder is the folder of the recordings", folder,
-                  "choose another one; a folder below it will do");
-    }
-  }
+  SIXPOINT_CHECK(refuse_folder_of_inputs(files, folder, inputs));
   SIXPOINT_CHECK(make_synced_folders(files, folder));
   auto lock = files.lock(repair_lock_in(folder));
   if (!lock) {

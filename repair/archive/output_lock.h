@@ -24,7 +24,8 @@ namespace sixpoint::repair {
 // Both make the folder where it is not there. cannot_create for "is refused", and for a folder that
 // holds another record (record_folder.h), whoever asks: a command, the station's page, Python, R;
 // null where the folder's file system has no locks. `inputs`: what is repaired; usage where one of them
-// is the folder itself: each recording would be its own output, and the manifest would lie among them.
+// is the folder itself, or a file in it: each recording would be its own output, and the manifest would
+// lie among them.
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder,
                                                   const std::vector<std::string>& inputs = {});
 Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,

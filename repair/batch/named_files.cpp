@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "repair/rescale/output_place.h"
+#include "repair/rescale/repair_report.h"
 
 namespace sixpoint::repair {
 
@@ -50,7 +51,7 @@ void refuse_same_outputs(std::vector<NamedFile>& files, const std::string& folde
     if (!fresh) {
       file.error = Error{ErrorCode::cannot_create,
                          fmt::format("{} would have the same name in {}", other->second, folder),
-                         file.path, "repair the two in separate runs, into separate folders"};
+                         file.path, kSeparateRuns};
     }
   }
 }

@@ -288,7 +288,7 @@ void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
     }
     if (inside[i]) {
       file.error = Error{ErrorCode::cannot_create, "this recording lies in the output folder",
-                         file.path, "choose an output folder that holds no recordings"};
+                         file.path, kFolderWithoutRecordings};
     }
     kept.push_back(std::move(file));
   }

@@ -176,6 +176,16 @@ bool refutes(GateRow row, const GateEvidence& evidence) {
          (row == GateRow::rounded_away && evidence.before_mg > kMostOfCorrected_mg);
 }
 
+std::string what_may_help(bool own_asked, std::size_t sides) {
+  constexpr std::size_t kAllSides = 6;
+  return !own_asked && sides == kAllSides
+             ? "what may help: --scan in place of these constants uses the unit's own still "
+               "periods, in which all sides were up"
+             : "what may help: the unit on the jig, or a calibration file made by it under "
+               "firmware "
+               "1.4.0 to 1.7.0";
+}
+
 GateAnswer gate(const GateEvidence& evidence, bool force) {
   GateAnswer answer;
   answer.row = row_of(evidence);

@@ -112,6 +112,17 @@ struct GateAnswer {
 GateAnswer gate(const GateEvidence& evidence, bool force);
 bool refutes(GateRow row, const GateEvidence& evidence);
 
+// What may help a file, or a unit's files, where the constants do not fit by the rows worse, no_better and
+// too_much_left, or by their own still periods. `sides`: those that were up, of six.
+//
+// | their own still periods were asked for constants | sides | may help                      |
+// |--------------------------------------------------|-------|-------------------------------|
+// | no: the constants came from elsewhere            | six   | --scan in place of what there |
+// |                                                  |       | was                           |
+// | no                                               | fewer | the jig, a calibration file   |
+// | yes                                              | any   | the jig, a calibration file   |
+std::string what_may_help(bool own_asked, std::size_t sides);
+
 // A sentence; empty where its constants may be lent. The survey is of the whole recording.
 std::string why_not_lent(const Survey& survey);
 

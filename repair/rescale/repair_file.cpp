@@ -20,6 +20,8 @@
 #include "repair/rescale/gate.h"
 #include "repair/rescale/repair_mark.h"
 #include "repair/rescale/rescaled_log.h"
+#include "repair/triage/file_tree.h"
+#include "repair/triage/scan_file.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -38,6 +40,8 @@ constexpr const char* kNotDecided =
 constexpr const char* kNotUndone =
     "the file's own constants cannot be undone, so no other constants help: without them its "
     "samples cannot be put right";
+constexpr const char* kOfPrior =
+    "the constants rest on a population prior (--allow-prior), not on this unit's data alone";
 constexpr const char* kDoneBefore = "repaired by an earlier run";
 constexpr const char* kMadeOtherwise =
     "the output that is there was made with other constants, options or rules than would be used "
@@ -119,7 +123,7 @@ class Repair {
     SIXPOINT_ASSIGN(const FileInfo now, env_.files.info(report_.input));
     if (now.size != before_.size || now.modified_ns != before_.modified_ns ||
         now.device != before_.device || now.inode != before_.inode) {
-      return fail(ErrorCode::bad_data, "the file changed while it was repaired", report_.input,
+      return fail(ErrorCode::bad_data, kChangedMeanwhile, report_.input,
                   "find out what writes to it, and repair it again");
     }
     return {};
@@ -127,8 +131,12 @@ class Repair {
 
   Status work() {
     if (!survey_and_write()) {
-      SIXPOINT_ASSIGN(survey_,
-                      survey(env_.files, report_.input, options_.still, {options_.salvage, {}}));
+      auto surveyed = survey(env_.files, report_.input, options_.still, {options_.salvage, {}});
+      if (!surveyed) {
+        return has_ending(report_.input, ".agd") ? answer_for_epochs()
+                                                 : Status(fail(surveyed.error()));
+      }
+      survey_ = *std::move(surveyed);
     }
     report_.losses = survey_.losses;
     report_.serial = survey_.facts.serial;
@@ -166,6 +174,22 @@ class Repair {
       }
     }
     return write();
+  }
+
+  // An .agd holds no samples: what scan says of it. The verdict stays empty: no constants help it,
+  // so its unit waits for none.
+  Status answer_for_epochs() {
+    ScannedFile scanned = scan_file(env_.files, report_.input);
+    if (scanned.error) {
+      return fail(*std::move(scanned.error));
+    }
+    report_.serial = scanned.facts.serial;
+    report_.calibration_time = scanned.facts.calibration_time;
+    report_.reasons = std::move(scanned.reasons);
+    report_.status = scanned.verdict == to_string(Verdict::not_affected)
+                         ? RepairStatus::not_affected
+                         : RepairStatus::not_repairable;
+    return {};
   }
 
   // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
@@ -285,6 +309,9 @@ class Repair {
       return {};
     }
     take_chosen(*std::move(choice.chosen));
+    if (report_.source->from_prior) {
+      report_.reasons.emplace_back(kOfPrior);
+    }
     return {};
   }
 
@@ -330,6 +357,10 @@ class Repair {
       report_.reasons.emplace_back("--force: repaired all the same");
     }
     if (!answer.write || (report_.forced && !options_.force)) {
+      if (report_.refutes_constants || answer.row == GateRow::no_better) {
+        report_.reasons.push_back(
+            what_may_help(is_of_still_periods(report_.method), report_.sides.size()));
+      }
       report_.forced = false;
       return false;
     }
@@ -457,7 +488,7 @@ class Repair {
                ? fail(ErrorCode::cannot_create, "this is a link to the recording itself", output_,
                       "remove the link, or choose another output folder")
                : fail(ErrorCode::cannot_create, "this is the recording itself", output_,
-                      "choose another output folder");
+                      kAnotherFolder);
   }
 
   Status write() {

@@ -13,6 +13,8 @@
 // | file                                                    | status                             |
 // |---------------------------------------------------------|------------------------------------|
 // | carries the mark                                        | already_repaired                   |
+// | an .agd (epochs, no samples), scan_file(): not affected | not_affected                       |
+// | ... affected, or cannot tell                            | not_repairable: make it again      |
 // | triage: not affected, axes right or undo_rotation off   | not_affected                       |
 // | triage: not affected, axes turned, undo_rotation on     | repaired, method `rotation`        |
 // | triage: cannot tell                                     | not_repairable                     |

@@ -75,6 +75,28 @@ Json RepairReport::to_json() const {
       {"output_sha256", optional_text(output_sha256)}};
 }
 
+NextRun next_run(const Error& error, bool salvage) {
+  if (error.hint == kAnotherFolder || error.hint == kFolderWithoutRecordings ||
+      error.hint == kSeparateRuns) {
+    return NextRun::none;
+  }
+  switch (error.code) {
+    case ErrorCode::no_input:
+    case ErrorCode::permission:
+    case ErrorCode::io:
+    case ErrorCode::cannot_create:
+      return NextRun::same;
+    case ErrorCode::bad_data:
+      if (error.what == kChangedMeanwhile) {
+        return NextRun::same;
+      }
+      return !salvage && error.hint.find("--salvage") != std::string::npos ? NextRun::with_salvage
+                                                                           : NextRun::none;
+    default:
+      return NextRun::none;
+  }
+}
+
 RepairReport failed_report(const std::string& input, const Error& error) {
   RepairReport report;
   report.input = input;

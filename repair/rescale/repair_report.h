@@ -86,6 +86,29 @@ struct RepairReport {
   nlohmann::ordered_json to_json() const;
 };
 
+// Which run of the same command, with --resume, can do a file that failed: at once, or when what its
+// line asks for was done. The first row that fits decides:
+//
+// | the error                                             | next run                            |
+// |-------------------------------------------------------|-------------------------------------|
+// | its hint is one of those below                        | none: only another command can      |
+// | no_input, permission, io, cannot_create               | same                                |
+// | the file changed while it was repaired                | same                                |
+// | bad_data that `--salvage` delivers (delivery.h), which| with_salvage                        |
+// | was not given                                         |                                     |
+// | any other                                             | none: the file stays what it is     |
+enum class NextRun { none, same, with_salvage };
+NextRun next_run(const Error& error, bool salvage);
+
+// Hints that another output folder, or another run, is needed.
+inline constexpr const char* kAnotherFolder = "choose another output folder";
+inline constexpr const char* kFolderWithoutRecordings =
+    "choose an output folder that holds no recordings";
+inline constexpr const char* kSeparateRuns =
+    "repair the two in separate runs, into separate folders";
+
+inline constexpr const char* kChangedMeanwhile = "the file changed while it was repaired";
+
 // The report of a file that could not be read at all.
 RepairReport failed_report(const std::string& input, const Error& error);
 

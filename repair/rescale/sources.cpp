@@ -22,6 +22,10 @@ constexpr std::array<std::string_view, 5> kSourceNames = {"constants", "calibrat
 
 std::string_view to_string(SourceKind kind) { return kSourceNames[static_cast<std::size_t>(kind)]; }
 
+bool is_of_still_periods(std::string_view kind) {
+  return kind == to_string(SourceKind::scan) || kind == to_string(SourceKind::unit_files);
+}
+
 std::vector<SourceKind> sources_in_order(const NamedSources& named) {
   std::vector<SourceKind> order;
   if (named.constants) {
@@ -81,7 +85,8 @@ std::string digest_of(const calib::ConstantsRecord& record) {
 
 SourceUsed source_used(const std::string& kind, const std::string& id,
                        const calib::ConstantsRecord& record) {
-  SourceUsed used{kind, id.empty() ? digest_of(record) : id, std::nullopt, std::nullopt};
+  SourceUsed used{kind, id.empty() ? digest_of(record) : id, std::nullopt, std::nullopt,
+                  record.from_prior};
   if (record.made_at != UtcTime{}) {
     used.made_at = record.made_at;
   }
@@ -108,6 +113,7 @@ nlohmann::ordered_json SourceUsed::to_json() const {
     json["made_at"] = to_iso8601(*made_at);
   }
   json["standard_uncertainty_mg"] = calib::number_or_null(standard_uncertainty_mg);
+  json["from_prior"] = from_prior;
   return json;
 }
 
@@ -119,7 +125,8 @@ std::optional<SourceUsed> parse_source_used(const nlohmann::ordered_json& json) 
   if (!json.is_object() || text("kind").empty()) {
     return std::nullopt;
   }
-  SourceUsed used{text("kind"), text("id"), std::nullopt, std::nullopt};
+  SourceUsed used{text("kind"), text("id"), std::nullopt, std::nullopt,
+                  json.value("from_prior", nlohmann::ordered_json()) == true};
   if (const auto made_at = parse_iso8601(text("made_at")); made_at) {
     used.made_at = *made_at;
   }

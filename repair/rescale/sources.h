@@ -37,6 +37,8 @@ namespace sixpoint::repair {
 
 enum class SourceKind { constants, calibration_file, scan, store, unit_files };
 std::string_view to_string(SourceKind kind);  // as `method` and `source.kind` have it
+// Were the still periods of affected files asked, of the file or of its unit's?
+bool is_of_still_periods(std::string_view kind);
 
 struct NamedSources {
   bool constants = false;
@@ -73,6 +75,7 @@ struct SourceUsed {
   std::optional<UtcTime> made_at;
   // Of a value of 1 g by what is applied (map_to_apply.h), the largest of the axes.
   std::optional<double> standard_uncertainty_mg;
+  bool from_prior = false;  // they rest on a population prior: --allow-prior
 
   std::string brief() const;  // "store 5c0f91aa (2026-11-22, +- 1.2 mg)"
   nlohmann::ordered_json to_json() const;

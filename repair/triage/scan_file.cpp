@@ -130,9 +130,9 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
     answer.evidence_mg = survey->magnitude.p95_mg;
     if (survey->magnitude.p95_mg > kEvidenceLimit_mg) {
       answer.reasons.push_back(
-          fmt::format("still periods are up to {:.0f} mg from 1 g (95th percentile of {}): the "
+          fmt::format("its {} still periods are {:.0f} mg from 1 g (95th percentile): the "
                       "constants do not fit the data",
-                      survey->magnitude.p95_mg, survey->magnitude.blocks));
+                      survey->magnitude.blocks, survey->magnitude.p95_mg));
     }
   } else {
     answer.reasons.push_back("no still periods, so the samples give no evidence");

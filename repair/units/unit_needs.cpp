@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text/csv_field.h"
+#include "repair/rescale/gate.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -50,8 +51,18 @@ std::string what_would_help(const UnitNeeds& unit) {
         wait, kHowTo);
   }
   if (unit.refused > 0) {
-    return fmt::format("{} not written with the constants that there are: read the reasons",
-                       files_text(unit.refused));
+    std::string text =
+        fmt::format("{} not written with the constants that there are: read the reasons",
+                    files_text(unit.refused));
+    if (unit.not_applied > 0) {
+      text += "; " + what_may_help(unit.of_still_periods, unit.sides_covered.size());
+    }
+    if (unit.of_store) {
+      text +=
+          fmt::format("; 'sixpoint history {}' lists what the store holds: withdraw what is wrong",
+                      printable(unit.serial, 40));
+    }
+    return text;
   }
   if (unit.scanned > 0) {
     return unit.sides_missing.empty()
@@ -89,6 +100,11 @@ void UnitTable::add(const RepairReport& report) {
     ++needs.repaired;
   } else if (report.source || report.status == RepairStatus::outdated) {
     ++needs.refused;
+    if (report.status != RepairStatus::outdated) {
+      ++needs.not_applied;
+      needs.of_still_periods = needs.of_still_periods || is_of_still_periods(report.source->kind);
+      needs.of_store = needs.of_store || report.source->kind == to_string(SourceKind::store);
+    }
   } else {
     ++needs.waiting;
     needs.contradiction = needs.contradiction || report.for_a_person;
@@ -116,7 +132,6 @@ void UnitTable::add(const std::string& serial, const UnitAnswer& answer) {
   UnitNeeds& needs = unit.needs;
   needs.serial = serial;
   needs.own_asked = true;
-  needs.files += answer.files;
   needs.affected += answer.files;
   const bool helped = answer.record || answer.own_suffices;
   (helped ? needs.scanned : needs.waiting) += answer.files;
@@ -151,10 +166,10 @@ std::string units_text(const std::vector<UnitNeeds>& rows, std::size_t limit) {
   const std::size_t shown = limit == 0 ? rows.size() : std::min(limit, rows.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const UnitNeeds& row = rows[i];
-    text += fmt::format("{:<16} {:>6} {:>8} {:>8} {:>8}  {:<17}  {}\n", serial_text(row.serial),
-                        row.files, row.affected, row.repaired, row.waiting,
-                        fmt::format("{}", fmt::join(row.sides_covered, " ")),
-                        row.help.empty() ? "-" : row.help);
+    text += fmt::format(
+        "{:<16} {:>6} {:>8} {:>8} {:>8}  {:<17}  {}\n", serial_text(row.serial),
+        row.files == 0 ? "-" : std::to_string(row.files), row.affected, row.repaired, row.waiting,
+        fmt::format("{}", fmt::join(row.sides_covered, " ")), row.help.empty() ? "-" : row.help);
   }
   if (shown < rows.size()) {
     text += fmt::format("... and {} more\n", rows.size() - shown);
@@ -180,7 +195,7 @@ Json units_json(const std::vector<UnitNeeds>& rows) {
   Json list = Json::array();
   for (const UnitNeeds& row : rows) {
     list.push_back({{"serial", row.serial},
-                    {"files", row.files},
+                    {"files", row.files == 0 ? Json(nullptr) : Json(row.files)},
                     {"affected", row.affected},
                     {"repaired", row.repaired},
                     {"waiting", row.waiting},

@@ -20,7 +20,11 @@
 // | ... and all sides were up, they were not asked              | --or-scan; where they do not   |
 // |                                                             | suffice: the jig, or a         |
 // |                                                             | calibration file               |
-// | all have constants that were not applied or are outdated    | their reasons                  |
+// | all have constants, and all that were not written are       | their reasons                  |
+// | outdated                                                    |                                |
+// | ... and some were not applied                               | their reasons; what_may_help() |
+// |                                                             | (gate.h) by the sides of all   |
+// | ... of the store                                            | ... and `history`              |
 // | they were only scanned                                      | repair; and the sides, if any  |
 //
 // Files that say no serial number, or cannot be read, are the unit "".
@@ -42,14 +46,17 @@ namespace sixpoint::repair {
 
 struct UnitNeeds {
   std::string serial;
-  std::size_t files = 0;
+  std::size_t files = 0;  // 0: not counted (a plan counts the affected ones alone)
   std::size_t affected = 0;
   std::size_t repaired = 0;
-  std::size_t waiting = 0;      // affected, and no constants were found
-  std::size_t refused = 0;      // affected, with constants, and not written or outdated
-  std::size_t scanned = 0;      // affected, and constants were not asked for
-  std::size_t cannot_tell = 0;  // whether they are affected
-  std::size_t failed = 0;       // could not be read or written
+  std::size_t waiting = 0;        // affected, and no constants were found
+  std::size_t refused = 0;        // affected, with constants, and not written or outdated
+  std::size_t not_applied = 0;    // of `refused`: not outdated
+  bool of_still_periods = false;  // ... by constants of the unit's own still periods
+  bool of_store = false;          // ... by those of the store
+  std::size_t scanned = 0;        // affected, and constants were not asked for
+  std::size_t cannot_tell = 0;    // whether they are affected
+  std::size_t failed = 0;         // could not be read or written
   bool contradiction = false;
   bool own_asked = false;                  // the files' own still periods were asked for constants
   std::vector<std::string> sides_covered;  // by the affected files together

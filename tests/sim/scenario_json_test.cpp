@@ -120,6 +120,12 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
       {R"({"effects": [{"name": "tilt", "parameters": {"angle_deg": "1"}}],
            "motions": [{"kind": "still"}]})",
        "/effects/0/parameters/angle_deg"},
+      {R"({"effects": [{"name": "drift"}, {"name": "tilt", "parameters": {"deg": 1}}],
+           "motions": [{"kind": "still"}]})",
+       "/effects/1/parameters/deg"},
+      {R"({"population": {"effects": [{"name": "drift", "mean": {"mg": 1}}]},
+           "motions": [{"kind": "still"}]})",
+       "/population/effects/0/mean/mg"},
       {R"({"effects": [{"name": "bandwidth", "parameters": {"corner_hz": -5}}],
            "motions": [{"kind": "still"}]})",
        "/effects/0/parameters/corner_hz"},
@@ -146,6 +152,21 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
     const std::string path = row.path;
     EXPECT_EQ(scenario.error().where, path.empty() ? "scenario" : "scenario: " + path) << row.json;
     EXPECT_THAT(scenario.error().hint, HasSubstr("docs/scenario.md"));
+  }
+}
+
+TEST(ScenarioJson, AnEffectThatIsNoneIsNamedWithItsPath) {
+  for (
+      const auto& [json, path] :
+      {std::pair(
+           R"({"effects": [{"name": "drift"}, {"name": "tillt"}], "motions": [{"kind": "still"}]})",
+           "scenario: /effects/1/name"),
+       {R"({"population": {"effects": [{"name": "tillt"}]}, "motions": [{"kind": "still"}]})",
+        "scenario: /population/effects/0/name"}}) {
+    const auto scenario = parse_scenario(json);
+    EXPECT_FAILS(scenario, ErrorCode::configuration);
+    EXPECT_EQ(scenario.error().where, path);
+    EXPECT_THAT(scenario.error().hint, HasSubstr("tilt"));
   }
 }
 

@@ -174,6 +174,41 @@ TEST_F(ArchiveCommand, WhereOnlyAnotherPlanHelpsNoRunIsAdvised) {
   EXPECT_THAT(damaged.people, testing::Not(HasSubstr("archive run")));
 }
 
+// A run fails again as long as the file is gone; the plan of what is there does not name it.
+TEST_F(ArchiveCommand, WhereAFileIsGoneAnotherPlanIsAskedFor) {
+  EXPECT_OK(some_minutes(1, 900).write(files_, archive_ + "/a.gt3x"));
+  EXPECT_OK(some_minutes(2, 900).write(files_, archive_ + "/b.gt3x"));
+  ASSERT_EQ(plan().exit_code, 0);
+  std::filesystem::remove(archive_ + "/b.gt3x");
+  run_shard(0);
+  const Answer gone = run({"archive", "merge", plan_});
+  EXPECT_EQ(gone.exit_code, 66);
+  EXPECT_THAT(gone.people,
+              HasSubstr("1 of its 2 files changed since the plan was made, or are gone"));
+  EXPECT_THAT(gone.people, HasSubstr("make another plan"));
+  EXPECT_THAT(gone.people, testing::Not(HasSubstr("archive run")));
+  EXPECT_TRUE(merge().json()["shards"][0]["rerun"].is_null());
+}
+
+// The command that runs it would be refused (73) as long as it runs.
+TEST_F(ArchiveCommand, ForAShardThatIsRunningTheMergeSaysToWait) {
+  fill();
+  plan({"--shards", "3"});
+  const Json before = merge().json()["shards"];
+  std::filesystem::create_directories(plan_ + "/results");
+  const auto held = files_.lock(plan_ + "/results/00000.lock");
+  ASSERT_OK(held);
+  const Answer words = run({"archive", "merge", plan_});
+  EXPECT_EQ(words.exit_code, 2);
+  EXPECT_THAT(words.people, HasSubstr("shard 0 is running (0 of "));
+  EXPECT_THAT(words.people, HasSubstr("files): wait for it\n"));
+  EXPECT_THAT(words.people, testing::Not(HasSubstr("--shard 0 ")));
+  EXPECT_THAT(words.people, HasSubstr("or all of them: sbatch --array=1,2 "));
+  const Json shards = merge().json()["shards"];
+  EXPECT_FALSE(before[0]["rerun"].is_null());
+  EXPECT_TRUE(shards[0]["rerun"].is_null());
+}
+
 TEST_F(ArchiveCommand, AnOutputThatWasTouchedIsRemovedBeforeTheRunIsAdvised) {
   EXPECT_OK(some_minutes(1, 900).write(files_, archive_ + "/a.gt3x"));
   ASSERT_EQ(plan().exit_code, 0);

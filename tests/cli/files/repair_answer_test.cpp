@@ -66,6 +66,16 @@ TEST_F(RepairAnswer, ConstantsThatCannotBeReadNameTheirFile) {
   const auto read = read_constants(posix_env().files, path("c.json"));
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().where, path("c.json"));
+  std::string two = tests::kConstants;
+  const auto at = two.find("\"zero_lsb\"");
+  ASSERT_NE(at, std::string::npos);
+  two.replace(at, two.find(']', at) + 1 - at, "\"zero_lsb\": [1, 2]");
+  std::ofstream(path("two.json")) << two;
+  const auto key = read_constants(posix_env().files, path("two.json"));
+  ASSERT_FALSE(key);
+  EXPECT_EQ(key.error().brief(), path("two.json") +
+                                     ": zero_lsb is not an array of three numbers, X Y Z; write "
+                                     "the file with sixpoint");
 }
 
 // A parser would take one of the two without a word.

@@ -15,6 +15,7 @@
 #include "db/store.h"
 #include "expect_result.h"
 #include "repair/jig_constants.h"
+#include "repair/made_agd.h"
 #include "repair/made_recording.h"
 #include "sanitized.h"
 #include "shared_data.h"
@@ -22,8 +23,11 @@
 namespace sixpoint::cli {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
+using testing::UnorderedElementsAre;
 using tests::kConstants;
 using tests::MadeRecording;
 
@@ -346,9 +350,52 @@ TEST_F(RepairCommand, TheFolderOfTheRecordingsIsNoOutputFolder) {
   EXPECT_FALSE(std::filesystem::exists(archive_ + "/manifest.csv"));
   const auto one = run({"repair", archive_ + "/affected.gt3x", "-o", archive_, "--constants",
                         folder_ / "constants.json"});
-  EXPECT_EQ(one.exit_code, 73);
-  EXPECT_THAT(one.out, HasSubstr("this is the recording itself; choose another"));
+  EXPECT_EQ(one.exit_code, 64);
+  EXPECT_THAT(one.people, HasSubstr("the folder of the recordings"));
   EXPECT_EQ(read_file(files_, archive_ + "/affected.gt3x").value(), before);
+  EXPECT_THAT(files_.list(archive_).value(), UnorderedElementsAre("affected.gt3x", "sub"));
+}
+
+// By the table of next_run(), each with a run of the command that is advised.
+TEST_F(RepairCommand, NoCommandIsAdvisedThatCanOnlyFailAgain) {
+  const std::string constants = folder_ / "constants.json";
+  const std::string other = folder_ / "other";
+  std::filesystem::create_directories(other);
+  std::filesystem::copy(archive_ + "/affected.gt3x", other);
+  const auto twice = run({"repair", archive_, other, "-o", out_, "--constants", constants});
+  EXPECT_EQ(twice.exit_code, 73);
+  EXPECT_THAT(twice.out, HasSubstr("repair the two in separate runs"));
+  EXPECT_THAT(twice.people, HasSubstr("1 of the files failed; do what their lines say: no run"));
+  EXPECT_THAT(twice.people, Not(HasSubstr("--resume")));
+
+  const std::string cut = other + "/affected.gt3x";
+  std::filesystem::resize_file(cut, std::filesystem::file_size(cut) * 3 / 4);
+  const auto damaged = run(
+      {"repair", cut, archive_ + "/none.gt3x", "-o", folder_ / "second", "--constants", constants});
+  EXPECT_THAT(damaged.people, HasSubstr("2 of the files failed; do what their lines say"));
+  EXPECT_THAT(damaged.people, HasSubstr(" --salvage --resume\n"));
+  const auto both = run({"repair", cut, archive_, other + "/../other/none.gt3x", "-o",
+                         folder_ / "third", "--constants", constants, "--salvage", "--resume"});
+  EXPECT_THAT(both.people, HasSubstr("2 of the files failed; another run can repair 1 of them"));
+}
+
+// An .agd that is named gets scan's answer: no constants help it, so no unit waits for any.
+TEST_F(RepairCommand, AnAgdIsToBeMadeAgain) {
+  const std::string agd = archive_ + "/epochs.agd";
+  tests::make_agd(agd, "MOS2A45130001", "1.5.0");
+  const std::string sentence =
+      "an .agd cannot be repaired: make it again from the repaired raw data";
+  EXPECT_THAT(run({"scan", agd}).out, HasSubstr(sentence));
+  const auto answer = run({"repair", agd, "-o", out_, "--scan"});
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.out, AllOf(HasSubstr("not_repairable"), HasSubstr(sentence)));
+  EXPECT_THAT(answer.people, AllOf(Not(HasSubstr("next:")), Not(HasSubstr("jig"))));
+  const auto folder = run({"repair", archive_, "-o", out_, "--scan", "--json"});
+  EXPECT_EQ(folder.exit_code, 0);
+  EXPECT_EQ(folder.json()["summary"]["files"], 2) << "of a folder, recordings";
+  tests::make_agd(archive_ + "/other.agd", "NEO1C15110001", "1.5.0");
+  EXPECT_EQ(run({"repair", archive_ + "/other.agd", "-o", out_, "--scan"}).exit_code, 0)
+      << "not affected";
 }
 
 // A file that would not be written now, and an earlier run's output of it: both are said.

@@ -166,6 +166,9 @@ TEST_F(SolveCommand, ConstantsOfTheLegacyFilterSaySo) {
               testing::HasSubstr("(firmware 1.3.0 chose it): its constants repair "
                                  "no affected file; record one with firmware 1.4.0"));
   EXPECT_THAT(notes("1.5.0"), testing::Not(testing::HasSubstr("legacy")));
+  const auto next = [&](const std::string& name) { return run({"solve", path(name)}).people; };
+  EXPECT_THAT(next("1.3.0.gt3x"), testing::Not(HasSubstr("--save")));
+  EXPECT_THAT(next("1.5.0.gt3x"), HasSubstr("--save"));
 }
 
 // Affected by its header, and right by the constants stored in it: other software leaves such a

@@ -108,7 +108,11 @@ TEST_F(GapAdopt, TheNextDiagnosisExpectsThePopulation) {
   EXPECT_EQ(learnt[0]["learnt_from_units"], 6);
   const auto alone = run({"gap", "diagnose", path("unit"), "--json"}).json()["effects"];
   EXPECT_EQ(alone[0]["learnt_from_units"], 0) << "the catalogue's sizes";
-  EXPECT_EQ(diagnose("unit.json").exit_code, 78) << "a scenario without a population";
+  const auto plain = diagnose("unit.json");
+  EXPECT_EQ(plain.exit_code, 78) << "a scenario without a population";
+  EXPECT_NE(plain.people.find(path("unit.json") + ": /population: this scenario has no population"),
+            std::string::npos)
+      << plain.people;
   EXPECT_EQ(diagnose("none.json").exit_code, 66);
 }
 

@@ -54,6 +54,8 @@ TEST_F(GapScore, APerfectAnswerIsPerfect) {
   answers.close();
   const auto scored = score("perfect.jsonl");
   ASSERT_EQ(scored.exit_code, 0) << scored.people;
+  EXPECT_EQ(run({"gap", "score", "--labels", path("l.jsonl")}).exit_code, 64);
+  EXPECT_EQ(run({"gap", "score", "--help"}).out.find("--answers TEXT REQUIRED"), std::string::npos);
   EXPECT_EQ(run({"gap", "score", "--labels", path("l.jsonl"), "--answers", path("perfect.jsonl"),
                  "--json"})
                 .out,

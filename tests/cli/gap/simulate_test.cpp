@@ -18,6 +18,10 @@ TEST_F(CommandTest, SimulateMakesTheSameBytes) {
       run({"simulate", "--scenario", path("s.json"), "-o", path("b.gt3x"), "--json"});
   const nlohmann::json json = nlohmann::json::parse(first.out);
   EXPECT_EQ(json["sha256"], nlohmann::json::parse(second.out)["sha256"]);
+  EXPECT_EQ(first.people, "");
+  const auto odd = run({"simulate", "--scenario", path("s.json"), "-o", path("bdl"), "--json"});
+  EXPECT_EQ(odd.exit_code, 0);
+  EXPECT_THAT(odd.people, testing::HasSubstr("names that end with .gt3x alone"));
   EXPECT_EQ(json["samples"], 3600);
   EXPECT_EQ(json["filter"]["in_force"], "current");
   std::ifstream truth(path("a.csv"));

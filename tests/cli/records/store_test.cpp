@@ -43,6 +43,10 @@ TEST_F(StoreTest, ExportImportAndBackupKeepTheHead) {
 TEST_F(StoreTest, WithdrawnConstantsRecallTheirFiles) {
   const std::string id = fill("a.db");
   EXPECT_EQ(run({"store", "recall", "--store", path("a.db"), "--json"}).json()["files"].size(), 0U);
+  EXPECT_THAT(run({"store", "recall", "--store", path("a.db")}).people,
+              HasSubstr("no file was repaired with constants that were withdrawn"));
+  EXPECT_EQ(run({"store", "due", "--days", "30000", "--store", path("a.db")}).people,
+            "no unit is due\n");
   EXPECT_EQ(run({"store", "withdraw", id, "--store", path("a.db")}).exit_code, 64) << "no reason";
   const auto withdrawn = run({"store", "withdraw", id, "--reason", "out of level", "--operator",
                               "Ada", "--store", path("a.db"), "--json"});
@@ -56,6 +60,7 @@ TEST_F(StoreTest, WithdrawnConstantsRecallTheirFiles) {
   EXPECT_EQ(trend["points"][0]["constants"]["zero_lsb"][2], 3);
   const auto due = run({"store", "due", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(due["units"][0]["serial"], "MOS2A1");
+  EXPECT_EQ(run({"store", "due", "--store", path("a.db")}).people, "");
   EXPECT_TRUE(due["units"][0]["last_constants"].is_null()) << "the only set was withdrawn";
   const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(yield["units"], 0);

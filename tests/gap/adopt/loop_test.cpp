@@ -109,11 +109,12 @@ TEST(AdoptionLoop, TheGapShrinksAndTheMeanIsThatOfTheHiddenPopulation) {
     hidden2 += units[i].cross.squaredNorm();
     left2 += (units[i].cross - adopted_mean).squaredNorm();
   }
-  EXPECT_NEAR(progress.new_ones.closed_fraction, 1 - left2 / hidden2, 0.03) << progress.brief();
+  EXPECT_NEAR(progress.new_ones.closed.fraction.value(), 1 - left2 / hidden2, 0.03)
+      << progress.brief();
   // In advance: the spread is 5.6 % of the mean's square, the mean of eight units adds an eighth of
   // that, and the mean square of twelve numbers is uncertain by 41 %, four times: 83 % at least.
-  EXPECT_GT(progress.new_ones.closed_fraction, 0.83) << progress.brief();
-  EXPECT_LT(progress.new_ones.closed_fraction, 1) << "the spread is left";
+  EXPECT_GT(progress.new_ones.closed.fraction.value(), 0.83) << progress.brief();
+  EXPECT_LT(progress.new_ones.closed.fraction.value(), 1) << "the spread is left";
   RecordProperty("brief", progress.brief());
 
   // Units simulated from the scenario have what was adopted, each its own: the diagnosis finds it.

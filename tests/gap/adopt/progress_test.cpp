@@ -52,12 +52,14 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   const ProgressSum& sum = progress.new_ones;
   EXPECT_NEAR(sum.after_mg[0], sum.before_mg / 2, 0.05 * sum.before_mg);
   EXPECT_LT(sum.after_mg[1], 1.5 * sum.floor_mg);
-  EXPECT_GT(sum.closed_fraction, 0.97);
-  EXPECT_LE(sum.closed_fraction, 1) << "also where less than the floor is left";
+  ASSERT_TRUE(sum.closed.fraction.has_value());
+  EXPECT_GT(*sum.closed.fraction, 0.97);
+  EXPECT_LE(*sum.closed.fraction, 1) << "also where less than the floor is left";
   ASSERT_EQ(progress.effects.size(), 1U);
   EXPECT_NEAR(progress.effects[0].without_mg, progress.all.before_mg, 1e-9)
       << "without its only effect nothing was learnt";
-  EXPECT_NEAR(progress.effects[0].closed_fraction, progress.all.closed_fraction, 1e-9);
+  EXPECT_NEAR(progress.effects[0].closed.fraction.value(), progress.all.closed.fraction.value(),
+              1e-9);
   EXPECT_THAT(progress.brief(), HasSubstr("did not learn"));
   EXPECT_TRUE(progress.usable());
 
@@ -72,6 +74,32 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   EXPECT_THAT(page, testing::Not(
                         testing::AnyOf(HasSubstr("http"), HasSubstr("src="), HasSubstr("<script"))))
       << "one page without other files";
+}
+
+TEST(Closed, FollowsTheTable) {
+  EXPECT_EQ(closed_of(0.26, 5.87, 0.26, 0.21).text(), "wider by 5.61 mg");
+  EXPECT_FALSE(closed_of(0.26, 5.87, 0.26, 0.21).fraction.has_value());
+  EXPECT_EQ(closed_of(9, 10, 20, 1).text(), "wider by 1.00 mg") << "an effect that does harm";
+  EXPECT_EQ(closed_of(1.5, 1.2, 1.5, 1).text(), "next to nothing was open");
+  EXPECT_FALSE(closed_of(1.5, 1.2, 1.5, 1).fraction.has_value());
+  EXPECT_EQ(closed_of(5, 3, 5, 0).fraction, 16.0 / 25);
+  EXPECT_EQ(closed_of(5, 3, 5, 0).text(), "64.0 %");
+  EXPECT_EQ(closed_of(5, 0.9, 5, 1).fraction, 1.0) << "below the floor is chance";
+}
+
+// A scenario that does not suit the unit: no share in the JSON, and words for people.
+TEST(GapProgressReport, WhereTheGapBecomesWiderThereIsNoShare) {
+  ScenarioHistory history;
+  history.states = {{1, "2026-01-01T00:00:00Z", 1, {cross_population(0.02)}}};
+  ProgressRecorder recorder(history);
+  ASSERT_OK(recorder.add("a", unit_with("A", 2, 0)));
+  const GapProgress progress = recorder.finish();
+  ASSERT_GT(progress.all.after_mg.back(), progress.all.before_mg);
+  EXPECT_THAT(progress.brief(), HasSubstr("): wider by "));
+  const auto json = progress.to_json();
+  EXPECT_TRUE(json["all"]["closed_fraction"].is_null());
+  EXPECT_TRUE(json["effects"][0]["closed_fraction"].is_null());
+  EXPECT_THAT(progress_html(progress), HasSubstr("<td>wider by "));
 }
 
 TEST(GapProgressReport, WithoutAdoptionsOrRecordingsItSaysSo) {

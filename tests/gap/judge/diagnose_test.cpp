@@ -234,7 +234,10 @@ TEST(Diagnose, DocumentHasEveryKey) {
 TEST(Diagnose, UnknownNameInWithoutIsUsage) {
   DiagnoseOptions options;
   options.without = {"gremlins"};
-  EXPECT_FAILS(diagnose(tests::made_production({}), options), ErrorCode::usage);
+  const auto refused = diagnose(tests::made_production({}), options);
+  EXPECT_FAILS(refused, ErrorCode::usage);
+  EXPECT_NE(refused.error().hint.find("misalignment, "), std::string::npos)
+      << "the names there are";
 }
 
 TEST(Diagnose, RecordingsThatSayNothingAreInconclusive) {

@@ -111,5 +111,23 @@ TEST(NextSegments, WhatIsKnownIsNotAsked) {
   }
 }
 
+// A record of raw counts, as a jig run is, has no constants that could be of another filter: no
+// segment of such a record shows it.
+TEST(NextSegments, OfRawCountsTheFilterMismatchIsNotAsked) {
+  DiagnoseOptions options;
+  options.uncalibrated = true;
+  const tests::Made made(tests::made_production({}), options);
+  EffectFinding gain{.name = "gain", .probability = 0.95, .confounded_with = {"filter_mismatch"}};
+  Findings given;
+  given.effects = {gain};
+  const auto offers = offers_for(made, given);
+  EXPECT_FALSE(offers.empty());
+  for (const auto& [name, next] : offers) {
+    for (const std::string& effect : next.separates) {
+      EXPECT_EQ(effect.find("filter_mismatch"), std::string::npos) << name << ": " << effect;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

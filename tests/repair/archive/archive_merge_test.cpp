@@ -34,6 +34,10 @@ TEST(MergedShard, WantsARerunByTheTable) {
   MergedShard shard;
   shard.state = ShardState::missing;
   EXPECT_TRUE(shard.wants_rerun());
+  shard.state = ShardState::running;
+  EXPECT_FALSE(shard.wants_rerun()) << "it would be refused";
+  shard.state = ShardState::partly;
+  EXPECT_TRUE(shard.wants_rerun());
   shard.plan_damaged = true;
   EXPECT_FALSE(shard.wants_rerun());
   shard = {};

@@ -198,5 +198,13 @@ TEST(WhyNotLent, FollowsTheTable) {
   EXPECT_EQ(why_of(own), "") << "only this unit's sensor makes such counts";
 }
 
+TEST(WhatMayHelp, FollowsTheTable) {
+  EXPECT_THAT(what_may_help(false, 6), HasSubstr("--scan in place of"));
+  for (const auto& [own_asked, sides] : {std::pair(false, 5U), {true, 6U}, {true, 5U}}) {
+    EXPECT_THAT(what_may_help(own_asked, sides), HasSubstr("the unit on the jig")) << sides;
+    EXPECT_THAT(what_may_help(own_asked, sides), testing::Not(HasSubstr("--scan"))) << sides;
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::repair

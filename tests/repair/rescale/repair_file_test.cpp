@@ -17,6 +17,7 @@
 #include "expect_result.h"
 #include "gt3x/made_archive.h"
 #include "repair/old_form.h"
+#include "repair/rescale/gate.h"
 #include "repair/rescale/repair_mark.h"
 #include "repair/six_sides.h"
 #include "shared_data.h"
@@ -304,12 +305,15 @@ TEST_F(RepairFile, ConstantsOfAnotherUnitAreRefusedByTheGateAndForcedWithAMark) 
   calib::Calibration other = kTrue;
   other.zero_lsb = {110, 20, 60};
   source_ = FixedConstants(other);
-  EXPECT_EQ(repair().status, RepairStatus::not_repairable);
+  const RepairReport refused = repair();
+  EXPECT_EQ(refused.status, RepairStatus::not_repairable);
+  EXPECT_EQ(refused.reasons.back(), what_may_help(false, 6));
   EXPECT_FALSE(exists("out.gt3x"));
   RepairOptions force;
   force.force = true;
   const RepairReport report = repair(force);
   ASSERT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_NE(report.reasons.back(), what_may_help(false, 6));
   EXPECT_TRUE(report.forced);
   const Bytes bytes = entry_of(memory_.files, "out.gt3x", kRepairMark);
   const auto mark = nlohmann::json::parse(bytes.begin(), bytes.end());
@@ -326,7 +330,10 @@ TEST_F(RepairFile, ConstantsThatTheFileContradictsAreNotApplied) {
   source_ = FixedConstants(old);
   const RepairReport report = repair();
   EXPECT_EQ(report.status, RepairStatus::not_repairable);
-  EXPECT_NE(report.reasons.back().find("on z"), std::string::npos) << report.reasons.back();
+  ASSERT_GE(report.reasons.size(), 2U);
+  const std::string& why = report.reasons[report.reasons.size() - 2];
+  EXPECT_NE(why.find("on z"), std::string::npos) << why;
+  EXPECT_EQ(report.reasons.back(), what_may_help(false, 6));
   RepairOptions force;
   force.force = true;
   EXPECT_TRUE(repair(force).forced);
@@ -487,6 +494,26 @@ TEST_F(RepairFile, RefusesConstantsThatAreNotForThisFile) {
   EXPECT_EQ(report.status, RepairStatus::not_repairable);
   EXPECT_EQ(report.reasons.back(), "no constants in the store");
   EXPECT_FALSE(exists("out.gt3x"));
+}
+
+// An answer that rests on other units says so, in words and for programs.
+TEST_F(RepairFile, ConstantsOfAPriorAreSaidWhereTheyAreUsed) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  const std::string why =
+      "the constants rest on a population prior (--allow-prior), not on this unit's data alone";
+  EXPECT_THAT(repair().reasons, testing::Not(testing::Contains(why)));
+  EXPECT_EQ(repair().to_json()["source"]["from_prior"], false);
+  ASSERT_OK(memory_.files.remove("out.gt3x"));
+  source_.choice.chosen->record.from_prior = true;
+  RepairOptions allowed;
+  allowed.allow_prior = true;
+  const RepairReport report = repair(allowed);
+  ASSERT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_THAT(report.reasons, testing::Contains(why));
+  EXPECT_EQ(report.to_json()["source"]["from_prior"], true);
+  EXPECT_TRUE(parse_source_used(report.to_json()["source"]).value().from_prior);
+  allowed.resume = true;
+  EXPECT_EQ(repair(allowed).to_json()["source"]["from_prior"], true) << "as its mark says";
 }
 
 // The log of a recording with other parameters.

@@ -128,7 +128,8 @@ TEST(ScanFile, EvidenceBeginsAtThePapers64mg) {
     const ScannedFile file = scanned(at_rest(up_lsb));
     ASSERT_TRUE(file.evidence_mg);
     EXPECT_NEAR(*file.evidence_mg, 17 / 0.256, 0.01);
-    EXPECT_THAT(file.reasons, Contains(HasSubstr("up to 66 mg from 1 g")));
+    EXPECT_THAT(file.reasons,
+                Contains(HasSubstr("its 5 still periods are 66 mg from 1 g (95th percentile)")));
   }
 }
 

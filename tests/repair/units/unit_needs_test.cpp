@@ -87,7 +87,29 @@ TEST(UnitNeeds, ConstantsThatWereRefusedAreNotMissing) {
   const UnitNeeds row = only_row({refused, affected(RepairStatus::outdated, {"+x"})});
   EXPECT_EQ(row.refused, 2U);
   EXPECT_EQ(row.waiting, 0U);
-  EXPECT_THAT(row.help, HasSubstr("reasons"));
+  EXPECT_THAT(row.help, AllOf(HasSubstr("reasons"), HasSubstr("the unit on the jig"),
+                              HasSubstr("'sixpoint history MOS2A45130450'")));
+  EXPECT_EQ(only_row({affected(RepairStatus::outdated, {"+x"})}).help,
+            "1 file not written with the constants that there are: read the reasons");
+}
+
+// Who named other constants has not asked the unit's own still periods, whatever the order was.
+TEST(UnitNeeds, WhereConstantsDoNotFitAndAllSidesWereUpTheyAreAdvised) {
+  auto refused = affected(RepairStatus::not_repairable, {"+x", "-x", "+y"});
+  auto other = affected(RepairStatus::not_repairable, {"-y", "+z", "-z"});
+  const auto help = [&](const char* source) {
+    refused.source = SourceUsed{source, "1", std::nullopt, std::nullopt};
+    other.source = refused.source;
+    UnitTable table({SourceKind::store, SourceKind::scan});
+    table.add(refused);
+    table.add(other);
+    return table.rows().at(0).help;
+  };
+  EXPECT_THAT(help("store"), AllOf(HasSubstr("--scan in place of"), HasSubstr("history")));
+  EXPECT_THAT(help("constants"), AllOf(HasSubstr("--scan in place of"), Not(HasSubstr("history"))));
+  EXPECT_THAT(help("scan"), AllOf(HasSubstr("the unit on the jig"), Not(HasSubstr("--scan"))));
+  EXPECT_THAT(help("unit_files"),
+              AllOf(HasSubstr("the unit on the jig"), Not(HasSubstr("--scan"))));
 }
 
 TEST(UnitNeeds, FilesThatWereScannedAreNotCalledWaiting) {
@@ -140,6 +162,10 @@ TEST(UnitNeeds, APlanKnowsWhatItsUnitsLack) {
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_THAT(rows[0].help, AllOf(HasSubstr("14 files wait"), HasSubstr("-z was never up")));
   EXPECT_EQ(rows[1].waiting, 0U);
+  // Of the units' other files the plan does not say how many there are.
+  EXPECT_EQ(rows[0].affected, 14U);
+  EXPECT_THAT(units_text(rows), HasSubstr("MOS2A1                -       14 "));
+  EXPECT_TRUE(units_json(rows)[0]["files"].is_null());
 }
 
 TEST(UnitNeeds, TheTableIsTextCsvAndJson) {
