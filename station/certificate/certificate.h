@@ -86,11 +86,11 @@ struct Certificate {
   nlohmann::ordered_json to_json() const;  // "sixpoint/certificate/1"
 };
 
-// bad_data where the record is no complete jig run. One that was stopped or is inconclusive has no
-// result to certify; a failed one has.
 // The method for people: "six_pose_pair" is "least squares, each axis by itself". A method that this
 // program does not know stays as it is.
 std::string method_in_words(const std::string& method);
+// bad_data where the record is no complete jig run. One that was stopped or is inconclusive has no
+// result to certify; a failed one has.
 Result<Certificate> certificate_of(const db::RunRecord& run);
 // A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN".
 Result<Bytes> certificate_pdf(const Certificate& certificate);
