@@ -46,10 +46,10 @@ struct JiggedUnit {
   device::Jig* jig = nullptr;
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
 };
+// Said to a person who has the hands of a virtual unit.
 inline constexpr std::string_view kWordsForHands =
     "you turn the virtual unit: +z and Enter lays it with its z axis up, -x with x down ...; "
-    "knock; "
-    "swap\n";
+    "knock; swap\n";
 // The files that the address of a device names are read, and never written over: those of
 // drive:FOLDER, faults=FILE of a virtual unit, replay:FILE. Before the command's outputs are looked
 // at.

@@ -33,7 +33,8 @@ RunSummary summary_of(const db::RunRecord& run);
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter);
 
 // Runs that started on or after the day `from` ("2027-03-31") and before the day `to`; empty: no
-// limit. usage where a text is no day, and where `from` is after `to`; `prefix` and from or to is then where ("--from").
+// limit. usage where a text is no day, and where `from` is after `to`; `prefix` and from or to is
+// then where ("--from").
 Result<db::RunFilter> runs_between(const std::string& from, const std::string& to,
                                    const std::string& prefix);
 

@@ -25,12 +25,16 @@ TEST(EvidenceHeldOut, HeldOutFloorInClosedForm) {
   EXPECT_EQ(held.tone_before_sigma, 0) << "no tones";
 }
 
-// What is found and not named is not fitted: it would leave its share in gains and offsets.
-TEST(EvidenceHeldOut, OnlyWhatIsNamedIsFitted) {
+std::vector<Block> drifting_dwells() {
   const Eigen::Vector3d drift_mg_per_h(9, -6, 7);
-  const auto blocks = tests::made_dwells(
+  return tests::made_dwells(
       [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift_mg_per_h; }, 5,
       120);
+}
+
+// What is found and not named is not fitted: it would leave its share in gains and offsets.
+TEST(EvidenceHeldOut, OnlyWhatIsNamedIsFitted) {
+  const auto blocks = drifting_dwells();
   const Explanation explanation(blocks, only({"drift"}));
   ASSERT_TRUE(explanation.best().contains("drift"));
   const Explanation::HeldOut held = explanation.held_out({});
@@ -62,10 +66,7 @@ Conditional conditional(const EvidenceModel& model, const tests::Marginal& all, 
 // The same by way of the covariance of the values instead of the normal equations of the
 // parameters: each condition's log likelihood given all others, with and without the effect.
 TEST(EvidenceHeldOut, PredictsEachConditionFromTheOthers) {
-  const Eigen::Vector3d drift_mg_per_h(9, -6, 7);
-  const auto blocks = tests::made_dwells(
-      [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift_mg_per_h; }, 5,
-      120);
+  const auto blocks = drifting_dwells();
   const Explanation explanation(blocks, only({"drift"}));
   ASSERT_TRUE(explanation.best().contains("drift"));
   ASSERT_EQ(explanation.best().scatter, Scatter::nominal);
