@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <span>
 
 namespace sixpoint::gap {
 namespace {
@@ -53,6 +54,7 @@ constexpr double kHighestOfRate = 0.495;  // corners: what the bilinear transfor
 constexpr double kHighestTried = 0.492;   // the end of the grid of corners
 constexpr double kSmallTone_g = 1.5;      // larger tones also show curvature of third order
 constexpr double kLineGuard_hz = 2.1;     // four bins beside a line
+constexpr std::array kForms = {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue};
 constexpr int kFolds = 4;                 // of the tones' frequencies
 
 class Search {
@@ -89,18 +91,23 @@ class Search {
     out_.has_tones = !ratios_.empty();
     fit_flat();
     find_bounds();
-    Search from_noise = *this;
+    const Search from_noise = *this;
     find_low_pass();
     double chi = find_mount();
     // The tones may have chosen another filter than the noise passed, or none, without the mount.
-    if (chi - freedom_ > kLeft_sd * std::sqrt(2 * freedom_) &&
-        from_noise.find_low_pass_beside_mount()) {
-      const double other_chi = from_noise.find_mount();
-      if (from_noise.out_.resonance_significant &&
-          from_noise.out_.low_pass.noise_nats - 0.5 * other_chi >
-              out_.low_pass.noise_nats - 0.5 * chi + kSignificant_nats) {
-        *this = std::move(from_noise);
-        chi = other_chi;
+    if (chi - freedom_ > kLeft_sd * std::sqrt(2 * freedom_)) {
+      for (const LowPassForm form : kForms) {
+        Search other = from_noise;
+        if (!other.find_low_pass_beside_mount(form)) {
+          continue;
+        }
+        const double other_chi = other.find_mount();
+        if (other.out_.resonance_significant &&
+            other.out_.low_pass.noise_nats - 0.5 * other_chi >
+                out_.low_pass.noise_nats - 0.5 * chi + kSignificant_nats) {
+          *this = std::move(other);
+          chi = other_chi;
+        }
       }
     }
     measure_left_over(chi);
@@ -133,12 +140,12 @@ class Search {
     return chi;
   }
 
-  // The low-pass that the noise alone chooses, the mount on top of it, and the low-pass that noise
-  // and tones choose beside that mount: a mount does not act on the sensor's noise. False where
-  // there is no mount.
-  bool find_low_pass_beside_mount() {
+  // The low-pass of this form that the noise alone chooses, the mount on top of it, and the low-pass
+  // that noise and tones choose beside that mount: a mount does not act on the sensor's noise, and
+  // the noise does not tell how tones pass. False where there is no mount.
+  bool find_low_pass_beside_mount(LowPassForm form) {
     tones_count_ = false;
-    search_low_pass();
+    search_low_pass({&form, 1});
     tones_count_ = true;
     const std::vector<double> low_pass_log = logs_of(out_.low_pass);
     const double base_chi = chi_of(low_pass_log);
@@ -270,11 +277,10 @@ class Search {
 
   // On a grid of orders, forms and corners. The corner is refined for each form and order: a tone
   // at the corner tells it to a thousandth, and on the grid a wrong form may be nearer.
-  void search_low_pass() {
+  void search_low_pass(std::span<const LowPassForm> forms = kForms) {
     const auto corners =
         static_cast<int>(std::log(kHighestTried * rate_hz_ / kLowestCorner_hz) / std::log(1.05));
-    for (const LowPassForm form :
-         {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
+    for (const LowPassForm form : forms) {
       if (ratios_.empty() && form == LowPassForm::mixed) {
         continue;  // without tones it is the sampled filter
       }

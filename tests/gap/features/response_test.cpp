@@ -70,22 +70,30 @@ TEST(Response, TonesBehindAResonanceGiveItsFrequencyAndQ) {
   EXPECT_FALSE(response.low_pass_significant);
 }
 
+// Noise of 4 mg behind this sampled low-pass of second order.
+NoiseSpectrum noise_behind(const Bundle& bundle, double corner_hz, std::size_t blocks) {
+  const double rounding_mg2 = std::pow(1000.0 / bundle.accel_scale_lsb_per_g, 2) / 12;
+  NoiseSpectrum noise;
+  noise.blocks = blocks;
+  noise.white_mg = {4, 4, 4};
+  for (int k = 1; k < 64; ++k) {
+    const double f_hz = k * bundle.rate_hz / 2 / 64;
+    const double h = low_pass_gain(f_hz, corner_hz, 2, bundle.rate_hz);
+    noise.frequency_hz.push_back(f_hz);
+    for (std::vector<double>& variance_mg2 : noise.variance_mg2) {
+      variance_mg2.push_back(16 * h * h + rounding_mg2);
+    }
+  }
+  return noise;
+}
+
 // A mount of 16 Hz before a filter of 22 Hz: the noise has passed the filter alone, the tones both.
 TEST(Response, TheNoiseTellsAFilterFromTheMountBeforeIt) {
   Bundle bundle;
   bundle.rate_hz = 100;
   bundle.accel_scale_lsb_per_g = 256;
-  const double rounding_mg2 = std::pow(1000.0 / 256, 2) / 12;
   const auto filter = [](double f_hz) { return low_pass_gain(f_hz, 22, 2, 100); };
-  NoiseSpectrum noise;
-  noise.blocks = 400;
-  noise.white_mg = {4, 4, 4};
-  for (int k = 1; k < 64; ++k) {
-    noise.frequency_hz.push_back(k * 50.0 / 64);
-    for (std::vector<double>& variance_mg2 : noise.variance_mg2) {
-      variance_mg2.push_back(std::pow(4 * filter(noise.frequency_hz.back()), 2) + rounding_mg2);
-    }
-  }
+  const NoiseSpectrum noise = noise_behind(bundle, 22, 400);
   const Resonance mount{16, 2.5, ResonanceForm::second_order, 0};
   std::vector<ToneFit> tones;
   for (const double f_hz : {2.0, 3.0, 5.0, 8.0, 12.0, 15.0, 20.0, 30.0, 40.0}) {
@@ -98,6 +106,28 @@ TEST(Response, TheNoiseTellsAFilterFromTheMountBeforeIt) {
   EXPECT_NEAR(response.low_pass.corner_hz, 22, 0.1);
   EXPECT_NEAR(response.resonance.frequency_hz, 16, 0.1);
   EXPECT_NEAR(response.resonance.q, 2.5, 0.05);
+}
+
+// Tones through a filter in front of the sampler (Butterworth, 1 / sqrt(1 + (f / corner)^4)) behind
+// a mount, and noise as of a sampled filter: the noise alone takes the tones' filter for another.
+TEST(Response, TheFormOfAFilterBehindAMountIsTheTones) {
+  Bundle bundle;
+  bundle.rate_hz = 100;
+  bundle.accel_scale_lsb_per_g = 256;
+  const NoiseSpectrum noise = noise_behind(bundle, 33.6, 2000);
+  const Resonance mount{13.3, 1.85, ResonanceForm::base_excited, 0};
+  std::vector<ToneFit> tones;
+  for (const double f_hz : {2.0, 3.0, 5.0, 8.0, 12.0, 15.0, 20.0, 30.0, 40.0}) {
+    add_tone(bundle, tones, f_hz, 1,
+             resonance_gain(f_hz, mount) / std::sqrt(1 + std::pow(f_hz / 33.6, 4)));
+  }
+  const Response response = find_response(bundle, noise, tones, {});
+  ASSERT_TRUE(response.low_pass_significant);
+  ASSERT_TRUE(response.resonance_significant);
+  EXPECT_NEAR(response.low_pass.corner_hz, 33.6, 0.2);
+  EXPECT_NEAR(response.resonance.frequency_hz, 13.3, 0.05);
+  EXPECT_NEAR(response.resonance.q, 1.85, 0.02);
+  EXPECT_LT(response.tone_left_sd, 1);
 }
 
 }  // namespace
