@@ -73,12 +73,39 @@ void add_parameters(const std::vector<NamedValue>& parameters, Json& json) {
   }
 }
 
+// Numbers that other generators' labels have under another name or in another unit. Answers have
+// both, so that labels and answers can be compared by name.
+struct SecondName {
+  std::string_view effect, first, second;
+  double factor;
+};
+constexpr std::array<SecondName, 2> kSecondNames = {
+    {{"sensitivity_tempco", "percent_per_c", "relative_per_c", 0.01},
+     {"soft_mount", "frequency_hz", "f0_hz", 1}}};
+
+std::vector<NamedValue> with_second_names(const EffectFinding& finding) {
+  std::vector<NamedValue> parameters = finding.parameters;
+  for (const NamedValue& parameter : finding.parameters) {
+    for (const SecondName& n : kSecondNames) {
+      if (finding.name == n.effect && parameter.name == n.first) {
+        NamedValue second = parameter;
+        second.name = n.second;
+        for (std::vector<double>* numbers : {&second.value, &second.sd, &second.form_sd}) {
+          std::ranges::for_each(*numbers, [&](double& x) { x *= n.factor; });
+        }
+        parameters.push_back(std::move(second));
+      }
+    }
+  }
+  return parameters;
+}
+
 Json finding_json(const EffectFinding& finding) {
   Json json;
   json["name"] = finding.name;
   json["probability"] = finite(finding.probability);
   json["evidence_nats"] = finite(finding.nats);
-  add_parameters(finding.parameters, json);
+  add_parameters(with_second_names(finding), json);
   if (!finding.further_lines.empty()) {
     json["further_lines"] = Json::array();
     for (const std::vector<NamedValue>& line : finding.further_lines) {
@@ -177,7 +204,10 @@ std::string Diagnosis::brief() const {
 
 bool is_derived(std::string_view effect, std::string_view parameter) {
   return (effect == "tilt" && parameter == "angle_deg") ||
-         (effect == "flicker" && parameter == "floor_mg");
+         (effect == "flicker" && parameter == "floor_mg") ||
+         std::ranges::any_of(kSecondNames, [&](const SecondName& n) {
+           return effect == n.effect && parameter == n.second;
+         });
 }
 
 Json augmented_scenario(const Diagnosis& diagnosis) {

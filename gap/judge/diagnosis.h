@@ -27,7 +27,8 @@ struct NamedValue {
 };
 
 // Whether a parameter of this effect follows from its others and is no setting of the simulator:
-// `angle_deg` of a tilt, `floor_mg` of flicker.
+// `angle_deg` of a tilt, `floor_mg` of flicker; and in JSON `relative_per_c` of a
+// sensitivity_tempco (a hundredth of `percent_per_c`) and `f0_hz` of a soft_mount.
 bool is_derived(std::string_view effect, std::string_view parameter);
 
 // Its uncertainties for people: "0.012", and "-" for a number that nothing shows.

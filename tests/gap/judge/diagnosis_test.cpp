@@ -173,6 +173,33 @@ TEST(Diagnosis, AugmentedScenarioHoldsTheUnitAndNothingDerived) {
   EXPECT_EQ(scenario->protocol->effects[0].values.at("angle_deg"), std::vector<double>{0});
 }
 
+// The labels of the practice bundles say relative_per_c and f0_hz where the simulator's settings
+// are percent_per_c and frequency_hz: the answer has both, the scenario only its own.
+TEST(Diagnosis, AnswersHaveTheNamesOfTheLabelsToo) {
+  gap::Diagnosis d;
+  d.protocol = "other";
+  d.serial = "MOS2A45130007";
+  d.unit.noise_mg = {3.9, 3.9, 5.5};
+  d.effects = {named("sensitivity_tempco"), named("soft_mount")};
+  d.effects[0].parameters = {{"percent_per_c", {0.03, 0.02, -0.01}, {0.004, 0.004, 0.004}}};
+  d.effects[1].parameters = {{"frequency_hz", {14}, {0.2}}, {"q", {2}, {0.1}}};
+  const nlohmann::ordered_json json = d.to_json();
+  const auto& tempco = json.at("effects").at(0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_DOUBLE_EQ(tempco.at("parameters").at("relative_per_c").at(i).get<double>(),
+                     d.effects[0].parameters[0].value[i] / 100);
+    EXPECT_DOUBLE_EQ(tempco.at("standard_uncertainty").at("relative_per_c").at(i).get<double>(),
+                     4e-5);
+  }
+  EXPECT_EQ(tempco.at("parameters").at("percent_per_c").at(0), 0.03);
+  const auto& mount = json.at("effects").at(1);
+  EXPECT_EQ(mount.at("parameters").at("f0_hz"), 14);
+  EXPECT_EQ(mount.at("parameters").at("frequency_hz"), 14);
+  const auto scenario = sim::parse_scenario(gap::augmented_scenario(d).dump());
+  ASSERT_OK(scenario);
+  EXPECT_EQ(json.at("augmented_scenario").dump().find("relative_per_c"), std::string::npos);
+}
+
 // Two lines are two effects of the simulator, and one of the answer.
 TEST(Diagnosis, FurtherLinesAreEffectsOfTheScenario) {
   gap::Diagnosis d;
