@@ -55,7 +55,7 @@ constexpr double kHighestTried = 0.492;   // the end of the grid of corners
 constexpr double kSmallTone_g = 1.5;      // larger tones also show curvature of third order
 constexpr double kLineGuard_hz = 2.1;     // four bins beside a line
 constexpr std::array kForms = {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue};
-constexpr int kFolds = 4;                 // of the tones' frequencies
+constexpr int kFolds = 4;  // of the tones' frequencies
 
 class Search {
  public:
