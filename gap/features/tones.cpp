@@ -10,6 +10,7 @@ namespace sixpoint::gap {
 namespace {
 
 constexpr std::size_t kShortestPiece = 10;  // three unknowns and some to test them
+constexpr std::size_t kSlipGuard = 12;      // that piece and the uncertainty of a cut
 // In squared residuals over their variance. Of white residuals the best cut gains about 25.
 constexpr double kCut = 60;
 constexpr double kPiece = 8;  // a cut and three unknowns
@@ -399,6 +400,23 @@ class ToneAnalysis {
     measure_residuals(x, phase0);
   }
 
+  // Where a slip lies is known to some samples: between its place and the cut the phase is wrong,
+  // which is on the slopes. So it is between two slips that are nearer than a piece is long, and
+  // behind one that is so near to an end.
+  std::vector<std::uint8_t> samples_beside_slips() const {
+    std::vector<std::uint8_t> beside(y_.size(), 0);
+    const auto mark = [&](std::size_t at) {
+      const std::size_t last = std::min(y_.size(), at + kSlipGuard);
+      for (std::size_t i = at - std::min(at, kSlipGuard); i < last; ++i) {
+        beside[i] = 1;
+      }
+    };
+    mark(static_cast<std::size_t>(std::ranges::find(good_, 1) - good_.begin()));
+    mark(y_.size());
+    std::ranges::for_each(fit_.slips, [&](const Slip& slip) { mark(slip.sample); });
+    return beside;
+  }
+
   // About level, tone, its harmonics and a phase error: `x`.
   void measure_residuals(const Eigen::Matrix<double, 5, 1>& x, double phase0) {
     double squares = 0;
@@ -406,6 +424,7 @@ class ToneAnalysis {
     double slope_weight = 0;
     double crest = 0;
     double crest_weight = 0;
+    const std::vector<std::uint8_t> beside_slip = samples_beside_slips();
     for (std::size_t i = 0; i < y_.size(); ++i) {
       if (good_[i] == 0) {
         continue;
@@ -415,6 +434,10 @@ class ToneAnalysis {
                                 x[3] * std::cos(3 * p) + x[4] * std::sin(p));
       const double s2 = std::sin(p) * std::sin(p);
       squares += r * r;
+      if (beside_slip[i] != 0) {
+        continue;
+      }
+      ++fit_.samples_apart;
       slope += r * r * s2;
       slope_weight += s2;
       crest += r * r * (1 - s2);

@@ -52,8 +52,10 @@ struct ToneFit {
   double residual_mg = 0;  // rms on `axis`
   // Squared residuals weighted by sin^2 p (slope) and cos^2 p (crest), mg^2, and 1 sd of either for
   // white residuals: jitter shows on slopes, a noisy gain on crests.
+  // Of `samples_apart`, those that are not beside a slip or at an end.
   double on_slope_mg2 = 0;
   double on_crest_mg2 = 0;
+  std::size_t samples_apart = 0;
   double frequency_ppm = 0;  // of the tone against the protocol, clock's error not taken out
   double frequency_sd_ppm = 0;
   std::vector<Slip> slips;

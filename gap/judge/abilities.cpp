@@ -136,7 +136,7 @@ Observable observable(const Request& request, unsigned abilities, const Records&
     return unless(!records.clean.axes_decidable);
   }
   if (name == "jitter" && found.bounds.count(name) == 0) {
-    return Observable::no;  // no tone is without lost or repeated samples
+    return Observable::no;  // of no tone all samples have a place
   }
   if ((entry.needs & ~abilities) != 0 ||
       (name == "filter_mismatch" && request.options.uncalibrated)) {

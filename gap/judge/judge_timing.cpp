@@ -246,18 +246,21 @@ JitterSums jitter_sums(const Request& request, const std::vector<ToneFit>& tones
   constexpr std::size_t kLeastSamples = 200;
   JitterSums sums;
   for (const ToneFit& tone : tones) {
-    if (!tone.usable || !tone.slips.empty() || tone.samples < kLeastSamples) {
+    const bool whole_steps =
+        std::ranges::all_of(tone.slips, [](const Slip& slip) { return slip.steps != 0; });
+    if (!tone.usable || !whole_steps || tone.samples_apart < kLeastSamples) {
       continue;
     }
+    const auto samples = static_cast<double>(tone.samples_apart);
     const double frequency_hz = request.bundle.segments[tone.segment].vibration->frequency_hz;
     const double rate = 2 * M_PI * frequency_hz * tone.in_phase_mg[tone.axis];  // mg/s
     const double white = noise.variance_at(static_cast<std::size_t>(tone.axis), frequency_hz);
     const double level = std::max(white, tone.residual_mg * tone.residual_mg);
-    const double sd = level * std::sqrt(4.0 / static_cast<double>(tone.samples));
+    const double sd = level * std::sqrt(4.0 / samples);
     const double lever = 0.5 * rate * rate;
     sums.tones.push_back({2 * M_PI * frequency_hz, tone.in_phase_mg[tone.axis],
                           tone.on_slope_mg2 - tone.on_crest_mg2, white,
-                          tone.residual_mg * tone.residual_mg, static_cast<double>(tone.samples)});
+                          tone.residual_mg * tone.residual_mg, samples});
     sums.up += lever * (tone.on_slope_mg2 - tone.on_crest_mg2) / (sd * sd);
     sums.down += lever * lever / (sd * sd);
   }

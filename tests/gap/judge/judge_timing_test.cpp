@@ -65,6 +65,34 @@ TEST(JudgeTiming, JitterHasNoBias) {
   EXPECT_GE(within, 6);
 }
 
+// Oracle: the truth of simulated units. Where samples are lost the phase is wrong for some samples;
+// what lies between is judged, and gives a size where there is one and none where there is none.
+TEST(JudgeTiming, JitterIsFoundBetweenLostSamples) {
+  for (const double true_ms : {0.0, 0.8}) {
+    nlohmann::ordered_json scenario = {
+        {"schema", "sixpoint/scenario/1"},
+        {"seed", 510},
+        {"protocol", "engineering"},
+        {"effects", {{{"name", "dropped_samples"}, {"parameters", {{"rate", 0.005}}}}}}};
+    if (true_ms > 0) {
+      scenario["effects"].push_back({{"name", "jitter"}, {"parameters", {{"rms_ms", true_ms}}}});
+    }
+    auto bundle = tests::simulated(scenario);
+    ASSERT_OK(bundle);
+    const Made made(*std::move(bundle));
+    const Timing timing = judge_timing(made.request, made.clean, made.noise);
+    EXPECT_GT(std::ranges::count_if(timing.tones,
+                                    [](const ToneFit& tone) { return !tone.slips.empty(); }),
+              20);
+    EXPECT_NE(effect(timing.found, "dropped_samples"), nullptr);
+    const EffectFinding* jitter = effect(timing.found, "jitter");
+    ASSERT_EQ(jitter != nullptr, true_ms > 0);
+    if (jitter != nullptr) {
+      EXPECT_NEAR(jitter->parameters[0].value[0], true_ms, 3 * jitter->parameters[0].sd[0]);
+    }
+  }
+}
+
 TEST(JudgeTiming, LostSamplesAreCounted) {
   Bundle bundle = tests::made_production({});
   for (const std::size_t segment : {3U, 11U}) {
