@@ -12,6 +12,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
 #include "db/records.h"
@@ -154,8 +155,8 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   auto kept = db::save(context.env.files, store, places, work);
   if (!kept || kept->in_store()) {
     if (kept && kept->caught_up > 0) {
-      context.log().info("{} entries of this station's journal are in the store now",
-                         kept->caught_up);
+      context.log().info("in the store now from this station's journal: {}",
+                         counted(kept->caught_up, "entry"));
     }
     return kept;
   }

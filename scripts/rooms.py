@@ -10,6 +10,7 @@ What must hold:
   the room that defines add_NAME counts as included.
 - No include runs up: a room's neighbours stand before it in the order in which CMake adds them.
 - A room that CMake adds only where a library is installed (mocks/umockdev) is a room as any other.
+- Each tests/**/*_test.cpp is named in a CMakeLists.txt: a test that is not built says nothing.
 - The text between the two marks in docs/architecture.md is what this script writes.
 """
 import pathlib
@@ -82,6 +83,13 @@ def problems(rooms):
             yield f"{room.folder} has no README.md"
 
 
+def tests_not_built():
+    lists = "".join(file.read_text() for file in (project / "tests").glob("**/CMakeLists.txt"))
+    for file in sorted((project / "tests").glob("**/*_test.cpp")):
+        if not re.search(rf"\b{file.name}\b", lists):
+            yield f"{file.relative_to(project)} is named in no CMakeLists.txt: it is not built"
+
+
 def picture(rooms):
     """A flowchart of the wings, and a line for each room with the neighbours that it sees."""
     wing = {room.name: room.folder.split("/")[0] for room in rooms}
@@ -111,7 +119,7 @@ def main():
     written = f"{before}{BEGIN}\n{picture(rooms)}\n{END}{rest.split(END)[1]}"
     if sys.argv[1:] == ["--write"]:
         page.write_text(written)
-    wrong = list(problems(rooms))
+    wrong = list(problems(rooms)) + list(tests_not_built())
     if written != page.read_text():
         wrong.append("docs/architecture.md is not what the link lines say; run scripts/rooms.py --write")
     print("\n".join(wrong) or f"{len(rooms)} rooms: includes, link lines and docs/architecture.md agree")

@@ -10,6 +10,7 @@
 #include <sys/vfs.h>
 #include <unistd.h>
 
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
 #include "cli/store_option.h"
@@ -103,8 +104,8 @@ Check check_journal(const DoctorCommandOptions& options, Context& context) {
     }
     if (*pending > 0) {
       return {"journal", false,
-              fmt::format("{} entries wait in {}: run '{}{}'", *pending, folder,
-                          catch_up_line(options.store),
+              fmt::format("{} {} in {}: run '{}{}'", counted(*pending, "entry"),
+                          *pending == 1 ? "waits" : "wait", folder, catch_up_line(options.store),
                           folder == own ? "" : " --journal " + bash_word(folder))};
     }
   }

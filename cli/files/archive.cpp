@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
@@ -91,10 +92,10 @@ Status run_shard(const ArchiveOptions& options, Context& context) {
   if (result->stopped) {
     context.worsen(kExitStopped);
     context.people << fmt::format(
-        "stopped: {} files of the shard are done; to go on:\n  sixpoint archive run {} --shard {} "
+        "stopped: {} of the shard done; to go on:\n  sixpoint archive run {} --shard {} "
         "-o {}{}\n",
-        result->files.size(), bash_word(options.plan), options.shard, bash_word(options.output),
-        options.redo_outdated ? " --redo-outdated" : "");
+        counted(result->files.size(), "file"), bash_word(options.plan), options.shard,
+        bash_word(options.output), options.redo_outdated ? " --redo-outdated" : "");
   }
   return {};
 }
@@ -275,8 +276,8 @@ class Merge {
     print_units(context_, units);
     context_.people << tally_.brief(false);
     if (!merged.complete()) {
-      context_.people << fmt::format("not complete: nothing is known of {} files yet\n",
-                                     merged.files_missing());
+      context_.people << fmt::format("not complete: nothing is known of {} yet\n",
+                                     counted(merged.files_missing(), "file"));
     }
     print_missing(merged, rerun, context_);
     if (merged.complete()) {
@@ -311,9 +312,10 @@ class Merge {
       const auto& [files, reason] = of;
       list.push_back({{"constants", id}, {"files", files}, {"reason", reason}});
       context_.log().warn(
-          "{} files were repaired with constants {}, which were withdrawn since the plan was made "
-          "({}): repair them by a new plan; 'sixpoint store recall {} --store {}' lists them",
-          files, db::shown_id(id), printable(reason), db::shown_id(id), bash_word(store_location_));
+          "constants {} were withdrawn since the plan was made ({}), and {} {} repaired with them: "
+          "repair by a new plan; 'sixpoint store recall {} --store {}' lists them",
+          db::shown_id(id), printable(reason), counted(files, "file"), files == 1 ? "was" : "were",
+          db::shown_id(id), bash_word(store_location_));
     }
     return list;
   }
@@ -387,8 +389,8 @@ Status run_report(const ArchiveOptions& options, Context& context) {
   json["complete"] = merged.complete();
   json["units"] = repair::units_json(table.rows());
   return print_answer(context, options.json, json,
-                      fmt::format("{} files in the report, {} have no result yet\n", reports.size(),
-                                  merged.files_missing()));
+                      fmt::format("{} in the report, {} without a result yet\n",
+                                  counted(reports.size(), "file"), merged.files_missing()));
 }
 
 // --- status

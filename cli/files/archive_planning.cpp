@@ -5,6 +5,7 @@
 #include <spdlog/logger.h>
 
 #include "base/sha256.h"
+#include "base/text/counted.h"
 #include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
 #include "cli/output.h"
@@ -90,12 +91,14 @@ std::vector<repair::UnitNeeds> units_of(const PlannedArchive& planned) {
 void print_plan(const ArchiveOptions& options, const PlannedArchive& planned, Context& context) {
   const ArchivePlan& plan = planned.plan;
   for (std::size_t k = 0; k < plan.shards.size(); ++k) {
-    context.out << fmt::format("shard {:05}  {} files  {:.1f} MB\n", k, plan.shards[k].files,
+    context.out << fmt::format("shard {:05}  {}  {:.1f} MB\n", k,
+                               counted(plan.shards[k].files, "file"),
                                static_cast<double>(plan.shards[k].bytes) / 1e6);
   }
   print_units(context, units_of(planned));
-  context.people << fmt::format("{} files, {:.1f} MB, in {} shards\n", plan.files(),
-                                static_cast<double>(plan.bytes()) / 1e6, plan.shards.size());
+  context.people << fmt::format("{}, {:.1f} MB, in {}\n", counted(plan.files(), "file"),
+                                static_cast<double>(plan.bytes()) / 1e6,
+                                counted(plan.shards.size(), "shard"));
   if (options.dry_run) {
     context.people << "dry run: nothing was written\n";
     return;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
 #include "repair/batch/answers.h"
@@ -96,11 +97,12 @@ Json RepairTally::to_json(bool dry_run) const { return repair::repair_summary(co
 
 std::string RepairTally::brief(bool dry_run) const {
   return fmt::format(
-      "{} files: {} repaired{}, {} not affected, {} already repaired, {} not repairable, {} "
+      "{}: {} repaired{}, {} not affected, {} already repaired, {} not repairable, {} "
       "outdated, {} failed\n",
-      files_, of(RepairStatus::repaired), dry_run ? " (dry run: nothing was written)" : "",
-      of(RepairStatus::not_affected), of(RepairStatus::already_repaired),
-      of(RepairStatus::not_repairable), of(RepairStatus::outdated), of(RepairStatus::failed));
+      counted(files_, "file"), of(RepairStatus::repaired),
+      dry_run ? " (dry run: nothing was written)" : "", of(RepairStatus::not_affected),
+      of(RepairStatus::already_repaired), of(RepairStatus::not_repairable),
+      of(RepairStatus::outdated), of(RepairStatus::failed));
 }
 
 Status write_study_report(Context& context, FileSystem& files, const std::string& path,

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
@@ -121,9 +122,9 @@ Status run_scan(const ScanCommandOptions& options, Context& context) {
   if (!options.json) {
     print_units(context, units);
     const auto count = [&](const char* key) { return summary[key].get<int>(); };
-    context.people << fmt::format(
-        "{} files: {} affected, {} not, {} cannot be told, {} unreadable\n", answers.size(),
-        count("affected"), count("not_affected"), count("cannot_tell"), count("unreadable"));
+    context.people << fmt::format("{}: {} affected, {} not, {} cannot be told, {} unreadable\n",
+                                  counted(answers.size(), "file"), count("affected"),
+                                  count("not_affected"), count("cannot_tell"), count("unreadable"));
     if (count("affected") > 0) {
       std::vector<std::string> next = some_paths(options.paths);
       next.insert(next.begin(), "repair");

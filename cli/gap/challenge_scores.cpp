@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/text/counted.h"
 #include "base/text/html.h"
 
 namespace sixpoint::cli {
@@ -193,10 +194,9 @@ std::string scores_page(const ChallengeSetting& options, const Scores& scores,
                         const std::vector<Outcome>& outcomes) {
   std::string html =
       html_head("Blind check of the gap diagnosis", "td.n{text-align:right}.bad{color:#b00020}");
-  html +=
-      fmt::format("<p>{} trials, {} protocol, seed {}{}. Shares with 95 % intervals.</p><table>",
-                  outcomes.size(), options.protocol, options.seed,
-                  options.strip ? ", true effects taken out of the catalogue" : "");
+  html += fmt::format("<p>{}, {} protocol, seed {}{}. Shares with 95 % intervals.</p><table>",
+                      counted(outcomes.size(), "trial"), options.protocol, options.seed,
+                      options.strip ? ", true effects taken out of the catalogue" : "");
   for (const auto& [what, value] : scores_lines(scores)) {
     html += fmt::format("<tr><td>{}</td><td>{}</td></tr>", what, value);
   }

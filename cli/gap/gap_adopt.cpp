@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/gap/gap_commands.h"
@@ -116,10 +117,10 @@ void print_gap_adopt(const gap::AdoptedScenario& learnt, const GapAdoptCommandOp
         const gap::MeanAndSpread& n = parameter.numbers[i];
         const bool known = n.standard_uncertainty > 0;
         context.text() << fmt::format(
-            "  {:<24} {:>10.4g} {:<12} spread {} ({} units)\n",
+            "  {:<24} {:>10.4g} {:<12} spread {} ({})\n",
             parameter.parameter + (per_axis ? fmt::format(" {}", "xyz"[i]) : ""), n.mean,
             known ? fmt::format("+- {:.2g}", n.standard_uncertainty) : "(not shown)",
-            n.spread ? fmt::format("{:.3g}", *n.spread) : "not known", n.units);
+            n.spread ? fmt::format("{:.3g}", *n.spread) : "not known", counted(n.units, "unit"));
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/gap/gap_commands.h"
@@ -119,10 +120,11 @@ Status run_gap_answers(const GapAnswersCommandOptions& options, Context& context
   json["bundles"] = names.size();
   json["failed"] = failed;
   json["dry_run"] = options.dry_run;
-  return print_answer(context, options.json, json,
-                      fmt::format("{}: {} bundles by {}, {} without an answer{}\n",
-                                  printable(options.output), names.size(), options.method, failed,
-                                  options.dry_run ? " (dry run: nothing was written)" : ""));
+  return print_answer(
+      context, options.json, json,
+      fmt::format("{}: {} by {}, {} without an answer{}\n", printable(options.output),
+                  counted(names.size(), "bundle"), options.method, failed,
+                  options.dry_run ? " (dry run: nothing was written)" : ""));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "base/text/counted.h"
 #include "cli/workers.h"
 #include "gap/benchmark/labels.h"
 #include "sim/bundle_writer.h"
@@ -113,7 +114,8 @@ Status export_challenge(const ExportOptions& options, Context& context) {
   json["dry_run"] = options.dry_run;
   return print_answer(
       context, options.json, json,
-      fmt::format("{}: {} bundles{}, labels in {}\n", printable(options.folder), options.trials,
+      fmt::format("{}: {}{}, labels in {}\n", printable(options.folder),
+                  counted(options.trials, "bundle"),
                   options.dry_run ? " would be written (dry run)" : "", printable(labels_file)));
 }
 

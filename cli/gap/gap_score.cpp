@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/gap/challenge_scores.h"
 #include "cli/gap/gap_commands.h"
@@ -44,7 +45,7 @@ Json benchmark_json(const gap::BenchmarkScores& scores) {
 }
 
 void print_gap_score(const gap::BenchmarkScores& scores, Context& context) {
-  context.text() << fmt::format("{} bundles, {} without an answer\n", scores.bundles,
+  context.text() << fmt::format("{}, {} without an answer\n", counted(scores.bundles, "bundle"),
                                 scores.missing);
   for (const gap::Measure& measure : scores.measures) {
     const std::string text =

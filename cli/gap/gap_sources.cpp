@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
@@ -32,7 +33,8 @@ Status add_runs(Context& context, const std::string& location, std::vector<GapSo
     }
   }
   if (without > 0) {
-    context.log().warn("{}: {} runs without samples are left out", printable(location), without);
+    context.log().warn("{}: {} without samples left out", printable(location),
+                       counted(without, "run"));
   }
   return {};
 }

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text/counted.h"
 #include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/output.h"
@@ -112,7 +113,8 @@ Result<Answer> catch_up(const StoreCommandOptions& options, Context& context) {
   }
   Answer answer;
   answer.json["taken"] = taken;
-  answer.note = fmt::format("{} entries of the journal are in the store now", taken);
+  answer.note = fmt::format("{} of the journal {} in the store now", counted(taken, "entry"),
+                            taken == 1 ? "is" : "are");
   return answer;
 }
 
@@ -155,8 +157,8 @@ Result<Answer> withdraw(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto recall, store.recall_list(id));
   answer.json["withdrawn"] = id;
   answer.json["recall"] = recall.size();
-  answer.note =
-      fmt::format("withdrawn; {} files were repaired with these constants", recall.size());
+  answer.note = fmt::format("withdrawn; {} {} repaired with these constants",
+                            counted(recall.size(), "file"), recall.size() == 1 ? "was" : "were");
   return answer;
 }
 
@@ -264,10 +266,9 @@ Result<Answer> yield(const StoreCommandOptions& options, Context& context) {
                       {"yield", number(report.yield())},
                       {"first_pass_yield", number(report.first_pass_yield())}});
   answer.text = fmt::format(
-      "{} units in {} runs ({} retests), {} units judged: {} passed; {} passed at their first "
-      "judged run\n",
-      report.units, report.runs, report.retests, report.judged, report.passed,
-      report.passed_first_time);
+      "{} in {} ({}), {} judged: {} passed; {} passed at their first judged run\n",
+      counted(report.units, "unit"), counted(report.runs, "run"), counted(report.retests, "retest"),
+      counted(report.judged, "unit"), report.passed, report.passed_first_time);
   return answer;
 }
 

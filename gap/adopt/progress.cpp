@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/counted.h"
+
 namespace sixpoint::gap {
 
 namespace {
@@ -158,13 +160,13 @@ std::string GapProgress::brief() const {
   }
   const ProgressSum& sum = new_ones.bundles > 0 ? new_ones : all;
   return fmt::format(
-      "{} recordings{}: {:.2f} mg before, {:.2f} mg after {} adoption{} (floor "
+      "{}{}: {:.2f} mg before, {:.2f} mg after {} (floor "
       "{:.2f} mg): {}{}",
-      sum.bundles,
+      counted(sum.bundles, "recording"),
       new_ones.bundles > 0 ? " from which the scenario did not learn"
                            : " from which the scenario learnt",
-      sum.before_mg, sum.after_mg.back(), history.size(), history.size() == 1 ? "" : "s",
-      sum.floor_mg, sum.closed.text(), sum.closed.fraction ? " closed" : "");
+      sum.before_mg, sum.after_mg.back(), counted(history.size(), "adoption"), sum.floor_mg,
+      sum.closed.text(), sum.closed.fraction ? " closed" : "");
 }
 
 Json GapProgress::to_json() const {

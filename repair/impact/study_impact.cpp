@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/counted.h"
 #include "base/text/csv_field.h"
 
 namespace sixpoint::repair {
@@ -103,10 +104,9 @@ std::string StudyImpact::brief() const {
   if (sum.files == 0) {
     text += "no recording could be compared with its copy\n";
   } else {
-    text +=
-        fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
-                    sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
-                    sum.mad_before_mg, sum.mad_after_mg);
+    text += fmt::format("{}, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
+                        counted(sum.files, "file"), sum.recorded_minutes, sum.enmo_before_mg,
+                        sum.enmo_after_mg, sum.mad_before_mg, sum.mad_after_mg);
     for (std::size_t i = 0; i < cuts.size(); ++i) {
       text += fmt::format("minutes {} > {:g}, {}: {:.1f} -> {:.1f}\n", to_string(cuts[i].measure),
                           cuts[i].value, printable(cuts[i].name, 40), sum.minutes_before[i],

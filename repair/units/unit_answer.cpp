@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/text/counted.h"
 #include "calib/application/agreement.h"
 #include "calib/application/map_to_apply.h"
 #include "calib/direction_cells.h"
@@ -121,7 +122,7 @@ std::string names_of(const std::vector<UnitFile>& files) {
       names.push_back(file_name_of(file.path));
     }
   }
-  return db::storable_path(fmt::format("{} files of the unit: {}{}", files.size(),
+  return db::storable_path(fmt::format("{} of the unit: {}{}", counted(files.size(), "file"),
                                        fmt::join(names, ", "),
                                        files.size() > names.size() ? ", ..." : ""));
 }
@@ -157,8 +158,9 @@ void take_pooled(const std::vector<UnitFile>& files, UtcTime now, UnitAnswer& an
   }
   answer.missing_sides = report->verification.missing_directions;
   if (!report->usable()) {
-    answer.why = fmt::format("the still periods of its {} files together do not suffice: {}",
-                             files.size(), fmt::join(report->verification.reasons, "; "));
+    answer.why =
+        fmt::format("the still periods of its {} together do not suffice: {}",
+                    counted(files.size(), "file"), fmt::join(report->verification.reasons, "; "));
     if (report->verification.contradicted) {
       refuse(answer, fmt::format("{}", fmt::join(report->verification.reasons, "; ")));
     }
@@ -175,8 +177,8 @@ void take_pooled(const std::vector<UnitFile>& files, UtcTime now, UnitAnswer& an
     return;
   }
   answer.row = UnitRow::pooled;
-  answer.why = fmt::format("the constants are those of the still periods of {} files of the unit",
-                           files.size());
+  answer.why = fmt::format("the constants are those of the still periods of {} of the unit",
+                           counted(files.size(), "file"));
   answer.record = *std::move(record);
   judge_pool(files, answer);
   if (answer.record) {

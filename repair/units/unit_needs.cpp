@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/counted.h"
 #include "base/text/csv_field.h"
 #include "repair/rescale/gate.h"
 
@@ -19,10 +20,6 @@ constexpr std::array<const char*, 6> kSides = {"+x", "-x", "+y", "-y", "+z", "-z
 constexpr const char* kHowTo =
     "put the unit on the jig, or record a calibration file with it under firmware 1.4.0 to 1.7.0";
 
-std::string files_text(std::size_t files) {
-  return files == 1 ? "1 file" : fmt::format("{} files", files);
-}
-
 std::string serial_text(const std::string& serial) {
   return serial.empty() ? "(not said)" : printable(serial, 40);
 }
@@ -33,7 +30,7 @@ std::string what_would_help(const UnitNeeds& unit) {
   const std::string never = fmt::format("{} {} never up", fmt::join(unit.sides_missing, " "),
                                         unit.sides_missing.size() == 1 ? "was" : "were");
   if (unit.waiting > 0) {
-    const std::string wait = fmt::format("{} {} for constants; ", files_text(unit.waiting),
+    const std::string wait = fmt::format("{} {} for constants; ", counted(unit.waiting, "file"),
                                          unit.waiting == 1 ? "waits" : "wait");
     if (unit.contradiction) {
       return wait + "what is known of the unit contradicts itself: put the unit on the jig";
@@ -53,7 +50,7 @@ std::string what_would_help(const UnitNeeds& unit) {
   if (unit.refused > 0) {
     std::string text =
         fmt::format("{} not written with the constants that there are: read the reasons",
-                    files_text(unit.refused));
+                    counted(unit.refused, "file"));
     if (unit.not_applied > 0) {
       text += "; " + what_may_help(unit.of_still_periods, unit.sides_covered.size());
     }

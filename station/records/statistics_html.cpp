@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text/counted.h"
 #include "base/text/html.h"
 #include "base/text/svg.h"
 #include "station/records/station_records.h"
@@ -40,9 +41,10 @@ std::string failure_bars(const GroupStatistics& all) {
   for (const auto& [code, count] : all.failure_codes) {
     const FailureCode* known = find_failure_code(code);
     html += fmt::format(
-        "<tr><th scope=row>{}</th><td><svg width={:.0f} height=14 role=img aria-label='{} runs'>"
+        "<tr><th scope=row>{}</th><td><svg width={:.0f} height=14 role=img aria-label='{}'>"
         "<rect width={:.1f} height=14 fill='#2b5c8a'/></svg> {}</td><td>{}</td></tr>\n",
-        html_escaped(code), kBar_px, count, kBar_px * static_cast<double>(count) / most, count,
+        html_escaped(code), kBar_px, counted(count, "run"),
+        kBar_px * static_cast<double>(count) / most, count,
         known != nullptr ? html_escaped(known->next_action) : "");
   }
   return html + "</table>\n";

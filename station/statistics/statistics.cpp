@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/counted.h"
 #include "station/statistics/distributions.h"
 
 namespace sixpoint::station {
@@ -265,8 +266,8 @@ std::string StatisticsReport::brief() const {
                ? std::string("-")
                : fmt::format("{:.1f} % ({} of {})", 100 * part.value(), part.count, part.of);
   };
-  return fmt::format("{} runs of {} units; yield {}, first pass {}", all.runs, all.units,
-                     percent(all.yield), percent(all.first_pass_yield));
+  return fmt::format("{} of {}; yield {}, first pass {}", counted(all.runs, "run"),
+                     counted(all.units, "unit"), percent(all.yield), percent(all.first_pass_yield));
 }
 
 Json StatisticsReport::to_json() const {
