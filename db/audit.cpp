@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/text/counted.h"
 #include "db/history.h"
 #include "db/store.h"
 
@@ -130,9 +129,8 @@ class Audit {
 }  // namespace
 
 std::string AuditReport::brief() const {
-  return ok ? fmt::format("{}, nothing touched, head {}", counted(rows, "row"), head)
-            : fmt::format("{}, {}, the first: {}", counted(rows, "row"),
-                          counted(findings.size(), "finding"),
+  return ok ? fmt::format("{} rows, nothing touched, head {}", rows, head)
+            : fmt::format("{} rows, {} findings, the first: {}", rows, findings.size(),
                           findings.empty() ? "" : findings.front());
 }
 

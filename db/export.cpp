@@ -2,7 +2,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
-#include "base/text/counted.h"
 #include "base/text/csv_field.h"
 #include "db/exchange.h"
 #include "db/export_json.h"
@@ -95,8 +94,7 @@ Status export_table(Database& database, FileSystem& files, const Table& table,
 }  // namespace
 
 std::string ExchangeReport::brief() const {
-  return fmt::format("{}, {}, head {}", counted(rows, "row"), counted(attachments, "attachment"),
-                     head);
+  return fmt::format("{} rows, {} attachments, head {}", rows, attachments, head);
 }
 
 Json ExchangeReport::to_json() const {
