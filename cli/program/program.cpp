@@ -75,7 +75,7 @@ void report_for_chosen(const CLI::App& app, const std::vector<std::string>& argu
 // A command line that is not understood.
 void report_usage(const CLI::App& app, const std::vector<std::string>& arguments,
                   const CLI::ParseError& refused, Context& context) {
-  Error error{ErrorCode::usage, printable(refused.what()), "",
+  Error error{ErrorCode::usage, plain_words(refused), "",
               fmt::format("'{} --help' lists what there is", words_of_command(app))};
   if (auto unknown = unknown_word(app, arguments)) {
     error.what = *std::move(unknown);

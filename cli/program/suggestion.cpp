@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <CLI/App.hpp>
+#include <CLI/Error.hpp>
 #include <fmt/format.h>
 
 #include "base/error.h"
@@ -86,6 +87,51 @@ std::optional<std::string> nearest_word(const std::string& typed,
     fewest = steps;
   }
   return nearest.size() == 1 ? std::optional(nearest.front()) : std::nullopt;
+}
+
+std::string plain_words(const CLI::ParseError& refused) {
+  const std::string text = printable(refused.what());
+  const std::string kind = refused.get_name();
+  // "NAME: rest", or the whole text.
+  const std::size_t colon = text.find(": ");
+  const std::string name = text.substr(0, std::min(colon, text.size()));
+  const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 2);
+  // What stands before and behind `middle` in `of`, after `start`.
+  const auto parts =
+      [](const std::string& of, std::string_view start,
+         std::string_view middle) -> std::optional<std::pair<std::string, std::string>> {
+    const std::size_t at = of.rfind(middle);
+    if (!of.starts_with(start) || at == std::string::npos || at < start.size()) {
+      return std::nullopt;
+    }
+    return std::pair(of.substr(start.size(), at - start.size()), of.substr(at + middle.size()));
+  };
+  if (kind == "ArgumentMismatch") {
+    if (rest.ends_with(" missing")) {
+      return name + " has no value";
+    }
+    if (const auto many = parts(rest, "At Most ", " required but received ")) {
+      return fmt::format("{} is given {} times, and is taken {}", name, many->second,
+                         many->first == "1" ? "once" : many->first + " times");
+    }
+    if (const auto few = parts(rest, "At least ", " required but received ")) {
+      return fmt::format("{}: at least {} are needed, {} is given", name, few->first, few->second);
+    }
+  }
+  if (kind == "ValidationError") {
+    if (const auto range = parts(rest, "Value ", " not in range ")) {
+      return fmt::format("{}: '{}' is no number from {}", name, range->first, range->second);
+    }
+  }
+  if (kind == "ExcludesError") {
+    if (const auto both = parts(text, "", " excludes ")) {
+      return fmt::format("{} and {} do not go together", both->first, both->second);
+    }
+  }
+  if (name.starts_with("The following argument")) {  // its kind is the command's name
+    return "more arguments than it takes: " + rest;
+  }
+  return text == "A subcommand is required" ? "a command is missing" : text;
 }
 
 std::optional<std::string> unknown_word(const CLI::App& app,

@@ -1,4 +1,4 @@
-// What the user may have meant by a command or an option that there is not.
+// What is wrong with a command line, in words, and what the user may have meant.
 //
 //   CLI::App app;
 //   declare_commands(app, context);
@@ -12,7 +12,8 @@
 
 namespace CLI {
 class App;
-}
+class ParseError;
+}  // namespace CLI
 
 namespace sixpoint::cli {
 
@@ -20,6 +21,20 @@ namespace sixpoint::cli {
 // only reads; whether the arguments are in order is the parser's to say.
 std::optional<std::string> unknown_word(const CLI::App& app,
                                         const std::vector<std::string>& arguments);
+
+// Why the parser refused a command line:
+//
+// | the parser's words                            | in plain words                                    |
+// |-----------------------------------------------|---------------------------------------------------|
+// | --output: 1 required TEXT missing             | --output has no value                             |
+// | --output: At Most 1 required but received 2   | --output is given 2 times, and is taken once      |
+// | RECORDING: At least 2 required but received 1 | RECORDING: at least 2 are needed, 1 is given      |
+// | --jobs: Value abc not in range 0 to 256       | --jobs: 'abc' is no number from 0 to 256          |
+// | --shards excludes --files                     | --shards and --files do not go together           |
+// | The following argument was not expected: c    | more arguments than it takes: c                   |
+// | A subcommand is required                      | a command is missing                              |
+// | anything else                                 | the same                                          |
+std::string plain_words(const CLI::ParseError& refused);
 
 // Which of `known` a person meant who typed `typed`:
 //

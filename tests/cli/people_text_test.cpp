@@ -32,12 +32,12 @@ class ZoneOf {
   std::string before_;
 };
 
-// Oracle: the POSIX form of TZ states the offset itself ("X-1" is one hour east).
+// Oracle: the POSIX form of TZ states the offset itself ("AAA-1" is one hour east; a name has three letters).
 TEST(LocalTime, HasTheOffsetAndNoFraction) {
   const UtcTime time = from_unix_seconds(1'395'619'200) + std::chrono::nanoseconds(193'496'967);
-  const ZoneOf east("X-1");
+  const ZoneOf east("AAA-1");
   EXPECT_EQ(local_time(time), "2014-03-24 01:00:00 +01:00");
-  const ZoneOf west("X3:30");
+  const ZoneOf west("AAA3:30");
   EXPECT_EQ(local_time(time), "2014-03-23 20:30:00 -03:30");
   const ZoneOf utc("UTC0");
   EXPECT_EQ(local_time(time), "2014-03-24 00:00:00 +00:00");

@@ -47,6 +47,11 @@ said <- tryCatch(read_gt3x_sixpoint("gaps.gt3x"), warning = conditionMessage)
 stopifnot(identical(said, "missingness has the first 10000 of 10001 gaps"))
 stopifnot(attr(read_gt3x_sixpoint("twice.gt3x"), "time_zone") == "-04:00:00")
 
+# A mistyped argument is named; where read.gt3x unpacks changes nothing.
+said <- tryCatch(read_gt3x_sixpoint("day1.gt3x", imputeZeros = TRUE), warning = conditionMessage)
+stopifnot(identical(said, "not used: imputeZeros; see args(read_gt3x_sixpoint)"))
+stopifnot(nrow(read_gt3x_sixpoint("day1.gt3x", exdir = tempdir())) == nrow(frame))
+
 # Only raw counts are refused, and not what has a calibration.json beside samples in g.
 for (name in c("scaled.gt3x", "calibrated.agdc", "in_g.agdc")) {
   x <- same_as_export(name)

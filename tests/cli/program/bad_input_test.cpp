@@ -177,5 +177,21 @@ TEST_F(BadRecording, WhatIsMissingNamesTheHelpOfItsCommand) {
               HasSubstr("serial is required; 'sixpoint store trend --help' lists"));
 }
 
+// The table of plain_words() in suggestion.h, a row each.
+TEST_F(BadRecording, WhyACommandLineIsRefusedInPlainWords) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> rows = {
+      {{"repair", "a", "-o"}, "--output has no value;"},
+      {{"repair", "a", "-o", "b", "-o", "c"}, "--output is given 2 times, and is taken once;"},
+      {{"compare", "a"}, "RECORDING: at least 2 are needed, 1 is given;"},
+      {{"repair", "a", "-o", "b", "--jobs", "abc"}, "--jobs: 'abc' is no number from 0 to 256;"},
+      {{"export", "a", "--csv", "b", "--imu", "--raw"}, "--raw and --imu do not go together;"},
+      {{"inspect", "a", "b"}, "more arguments than it takes: b;"},
+      {{"archive"}, "a command is missing; 'sixpoint archive --help' lists"},
+      {{"history"}, "serial is required;"}};
+  for (const auto& [arguments, words] : rows) {
+    EXPECT_THAT(run_command(memory_.env, arguments).people, HasSubstr("sixpoint: " + words));
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

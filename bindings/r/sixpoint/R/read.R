@@ -1,5 +1,11 @@
 read_gt3x_sixpoint <- function(path, verbose = FALSE, asDataFrame = FALSE, imputeZeroes = FALSE,
                                cleanup = FALSE, ..., add_light = FALSE) {
+  # read.gt3x hands these on to what unpacks the archive, which is not done here.
+  ignored <- setdiff(names(list(...)), c("", "exdir", "location", "dirname"))
+  if (length(ignored) > 0) {
+    warning("not used: ", paste(ignored, collapse = ", "), "; see args(read_gt3x_sixpoint)",
+            call. = FALSE)
+  }
   if (isTRUE(add_light)) {
     stop("light is not read; use 'sixpoint export --records LUX'", call. = FALSE)
   }
