@@ -335,7 +335,12 @@ void print_scores(const GapChallengeCommandOptions& options, const Scores& score
   }
 }
 
-Status end_stopped(Context& context) {
+Status end_stopped(const GapChallengeCommandOptions& options, Context& context) {
+  if (options.json) {
+    Json json = document("gap-challenge");
+    json["stopped"] = true;
+    print_json(context, json);
+  }
   context.people << "stopped; nothing is scored\n";
   context.worsen(kExitStopped);
   return {};
@@ -373,7 +378,7 @@ Status challenge(GapChallengeCommandOptions options, Context& context) {
     const Status learnt =
         learn_own(env, options, folder.path(), [&stop] { return stop.requested(); });
     if (stop.requested()) {
-      return end_stopped(context);
+      return end_stopped(options, context);
     }
     SIXPOINT_CHECK(learnt);
     if (std::all_of(options.only.begin(), options.only.end(),
@@ -385,7 +390,7 @@ Status challenge(GapChallengeCommandOptions options, Context& context) {
   SIXPOINT_ASSIGN(const auto trials,
                   run_trials(env, options, *protocol, folder.path(), stop, context));
   if (stop.requested()) {
-    return end_stopped(context);
+    return end_stopped(options, context);
   }
   std::vector<Outcome> outcomes;
   outcomes.reserve(trials.size());

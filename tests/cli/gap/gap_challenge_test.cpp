@@ -65,8 +65,11 @@ TEST_F(GapChallenge, StoppedItLeavesNoProcessAndNoFolder) {
     ASSERT_GE(child, 0);
     if (child == 0) {
       ::setenv("TMPDIR", temporary.c_str(), 1);
+      if (std::freopen((folder_ / "stdout").c_str(), "w", stdout) == nullptr) {
+        ::_exit(126);
+      }
       ::execl(SIXPOINT_PROGRAM, "sixpoint", "gap", "challenge", "--protocol", "production",
-              "--trials", "4", "--program", path.c_str(), nullptr);
+              "--trials", "4", "--json", "--program", path.c_str(), nullptr);
       ::_exit(127);
     }
     while (!std::filesystem::exists(folder_ / "ready")) {
@@ -78,6 +81,10 @@ TEST_F(GapChallenge, StoppedItLeavesNoProcessAndNoFolder) {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFEXITED(status));
     EXPECT_EQ(WEXITSTATUS(status), 3);
+    std::ifstream out(folder_ / "stdout");
+    const auto json = nlohmann::ordered_json::parse(out, nullptr, /*allow_exceptions=*/false);
+    ASSERT_TRUE(json.is_object());
+    EXPECT_EQ(json["stopped"], true);
     EXPECT_TRUE(std::filesystem::is_empty(temporary));
     pid_t diagnosis = 0;
     std::ifstream(folder_ / "ready") >> diagnosis;
