@@ -123,6 +123,11 @@ std::string plain_words(const CLI::ParseError& refused) {
       return fmt::format("{}: '{}' is no number from {}", name, range->first, range->second);
     }
   }
+  if (kind == "ConversionError") {
+    if (const auto option = parts(text, "Could not convert: ", " = ")) {
+      return fmt::format("{} cannot be '{}'", option->first, option->second);
+    }
+  }
   if (kind == "ExcludesError") {
     if (const auto both = parts(text, "", " excludes ")) {
       return fmt::format("{} and {} do not go together", both->first, both->second);

@@ -30,6 +30,7 @@ std::optional<std::string> unknown_word(const CLI::App& app,
 // | --output: At Most 1 required but received 2   | --output is given 2 times, and is taken once      |
 // | RECORDING: At least 2 required but received 1 | RECORDING: at least 2 are needed, 1 is given      |
 // | --jobs: Value abc not in range 0 to 256       | --jobs: 'abc' is no number from 0 to 256          |
+// | Could not convert: --seed = x                 | --seed cannot be 'x'                              |
 // | --shards excludes --files                     | --shards and --files do not go together           |
 // | The following argument was not expected: c    | more arguments than it takes: c                   |
 // | A subcommand is required                      | a command is missing                              |

@@ -186,6 +186,7 @@ TEST_F(BadRecording, WhyACommandLineIsRefusedInPlainWords) {
       {{"repair", "a", "-o", "b", "--jobs", "abc"}, "--jobs: 'abc' is no number from 0 to 256;"},
       {{"export", "a", "--csv", "b", "--imu", "--raw"}, "--raw and --imu do not go together;"},
       {{"inspect", "a", "b"}, "more arguments than it takes: b;"},
+      {{"gap", "challenge", "--seed", "x"}, "--seed cannot be 'x';"},
       {{"archive"}, "a command is missing; 'sixpoint archive --help' lists"},
       {{"history"}, "serial is required;"}};
   for (const auto& [arguments, words] : rows) {
