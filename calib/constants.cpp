@@ -391,7 +391,7 @@ Result<ConstantsRecord> parse_constants_record(std::string_view text) {
   }
   const Json json = parse_json(text);
   if (json.is_discarded()) {
-    return fail(ErrorCode::bad_data, "is not JSON", "constants.json",
+    return fail(ErrorCode::bad_data, "is not JSON: " + why_no_json(text), "constants.json",
                 "give a file written by 'sixpoint solve -o'");
   }
   return constants_record_from_json(json);

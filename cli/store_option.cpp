@@ -192,6 +192,16 @@ Json kept_to_json(const db::Saved& kept) {
           {"error", kept.refusal ? error_to_json(*kept.refusal) : Json(nullptr)}};
 }
 
+Result<std::string> warn_of_stored(Context& context, db::Store& store, const std::string& serial,
+                                   calib::FilterConfiguration filter, const std::string& id) {
+  SIXPOINT_ASSIGN(const auto history, store.constants_history(serial));
+  std::string said = repair::said_of_stored(history, filter, id, context.env.clock.now());
+  if (!said.empty()) {
+    context.log().warn("{}", said);
+  }
+  return said;
+}
+
 Status write_constants(FileSystem& files, const std::string& path,
                        const calib::ConstantsRecord& record) {
   return path.empty() ? Status() : write_file(files, path, calib::to_json(record).dump(2) + "\n");
@@ -209,11 +219,8 @@ Result<SavedConstants> save_in_store(Context& context, const std::string& locati
   };
   SIXPOINT_ASSIGN(done.place, keep_records(context, location, store, work, last_resort));
   if (done.place.in_store()) {
-    SIXPOINT_ASSIGN(const auto history, store->constants_history(record.serial));
-    const auto applying = repair::applying_constants(history, record.filter);
-    if (!applying.doubt.empty() || applying.conflict) {
-      context.log().warn("{}", applying.conflict ? applying.why : applying.doubt);
-    }
+    SIXPOINT_ASSIGN(done.said,
+                    warn_of_stored(context, *store, record.serial, record.filter, done.id));
   }
   return done;
 }

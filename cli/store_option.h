@@ -99,6 +99,11 @@ std::string kept_as(const db::Saved& kept, const std::string& id);
 // {"in": "store" | "journal", "folder", "error"}
 Json kept_to_json(const db::Saved& kept);
 
+// Warns where constants that are in the store now are not those that apply, or where another set
+// disagrees with them (said_of_stored() in repair/rescale/applying_constants.h). Returns the words.
+Result<std::string> warn_of_stored(Context& context, db::Store& store, const std::string& serial,
+                                   calib::FilterConfiguration filter, const std::string& id);
+
 // Constants as a file (empty: none).
 Status write_constants(FileSystem& files, const std::string& path,
                        const calib::ConstantsRecord& record);
@@ -108,6 +113,7 @@ struct SavedConstants {
   std::string id;
   db::Saved place;
   std::optional<Error> file_problem = std::nullopt;  // why their file was not written
+  std::string said = {};                             // by warn_of_stored()
 };
 // Also written to the file `path` of `files`. Neither stops the other.
 Result<SavedConstants> save_constants(Context& context, FileSystem& files,

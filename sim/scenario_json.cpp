@@ -505,7 +505,7 @@ Result<Scenario> parse_scenario(std::string_view json) {
   }
   const Json document = parse_json<Json>(json);
   if (document.is_discarded()) {
-    return wrong("", "this is not JSON");
+    return wrong("", "this is not JSON: " + why_no_json(json));
   }
   try {
     return parse_document(document);

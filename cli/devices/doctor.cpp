@@ -72,6 +72,24 @@ Check check_place_of_store(const DoctorCommandOptions& options, Context& context
                                          path, why)};
 }
 
+// Constants that were made while a clock was ahead come before all that are measured now. An hour: the
+// clocks of two stations differ.
+Result<std::string> constants_of_the_future(db::Store& store, UtcTime now) {
+  SIXPOINT_ASSIGN(auto units, store.units_due(UtcTime::max()));
+  std::erase_if(units, [&](const db::DueUnit& unit) {
+    return !unit.last_constants || *unit.last_constants <= now + std::chrono::hours(1);
+  });
+  if (units.empty()) {
+    return std::string();
+  }
+  const db::DueUnit& last = units.back();
+  return fmt::format(
+      "constants of {} are of a date in the future, those of {} of {}: a clock was ahead, or this "
+      "one is behind; set it, else look at 'sixpoint history {}' and withdraw them",
+      counted(units.size(), "unit"), printable(last.serial),
+      to_iso8601(*last.last_constants).substr(0, 10), bash_word(last.serial));
+}
+
 Check check_store(const DoctorCommandOptions& options, Context& context) {
   if (!store_exists(context, options.store)) {
     return check_place_of_store(options, context);
@@ -82,10 +100,14 @@ Check check_store(const DoctorCommandOptions& options, Context& context) {
     return {"store", false, store.error().brief()};
   }
   const auto audit = store->audit();
-  if (!audit) {
-    return {"store", false, audit.error().brief()};
+  if (!audit || !audit->ok) {
+    return {"store", false, audit ? audit->brief() : audit.error().brief()};
   }
-  return {"store", audit->ok, audit->brief()};
+  const auto future = constants_of_the_future(*store, context.env.clock.now());
+  if (!future || !future->empty()) {
+    return {"store", false, future ? *future : future.error().brief()};
+  }
+  return {"store", true, audit->brief()};
 }
 
 // Are there measurements that the store did not take yet?

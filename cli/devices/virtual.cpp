@@ -120,6 +120,11 @@ Result<FirstUnit> first_unit(Context& context, const VirtualCommandOptions& opti
   std::string_view text = options.device;
   if (text.starts_with(kScheme)) {
     text.remove_prefix(kScheme.size());
+  } else if (const std::size_t equals = text.find('=');
+             !text.empty() && (equals == text.npos || text.find(':') < equals)) {
+    return fail(ErrorCode::usage, "only a virtual unit can be served",
+                "--device " + printable(options.device, 80),
+                "give virtual:KEY=VALUE,... or nothing; docs/virtual.md lists the settings");
   }
   SIXPOINT_ASSIGN(auto settings,
                   mocks::parse_virtual_settings(text, options.seed.value_or(context.env.seed)));

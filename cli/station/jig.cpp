@@ -435,6 +435,13 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
         return done;
       }
       record.head = *head;
+      if (done.constants_id) {
+        const auto said = warn_of_stored(context, *store, done.report.serial, done.report.filter,
+                                         *done.constants_id);
+        if (!said) {
+          report_error(context, said.error());
+        }
+      }
     }
     make_papers(context, options, outputs, record, done);
   } else if (done.kept) {

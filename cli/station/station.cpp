@@ -116,7 +116,8 @@ class StationStore {
     auto store = opened();
     SIXPOINT_ASSIGN(auto saved, save_capture(context_, context_.env, options_.store, store, report,
                                              report.file + ".constants.json", LastResort::none));
-    return station::KeptConstants{std::move(saved.id), std::move(saved.file_problem)};
+    return station::KeptConstants{std::move(saved.id), std::move(saved.file_problem),
+                                  std::move(saved.said)};
   }
   Result<station::RunDocument> document(const std::string& run_id, const std::string& kind);
   // Labels of runs go there by themselves from now on (print_rule.h).
@@ -213,6 +214,11 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
   if (saved.in_store()) {
     stored.documents = station::documents_of(run);  // made from the store alone
     print_label(run);
+    if (stored.ids.constants_id) {
+      stored.said =
+          warn_of_stored(context_, *store, report.serial, report.filter, *stored.ids.constants_id)
+              .value_or("");
+    }
   }
   if (const Status noted = guard_.note_run(run, saved.in_store()); !noted) {
     context_.log().warn("{}", noted.error().brief());

@@ -49,6 +49,30 @@ std::string message_name(std::span<const std::uint8_t> bytes) {
                  : fmt::format("{} bytes that are no request", bytes.size());
 }
 
+// Of two requests of one name; empty where their names say it, or where one is no request.
+std::string what_differs(std::span<const std::uint8_t> sent,
+                         std::span<const std::uint8_t> recorded) {
+  const Result<Message> ours = decode(sent);
+  const Result<Message> theirs = decode(recorded);
+  if (!ours || !theirs || ours->command != theirs->command) {
+    return {};
+  }
+  const Bytes& one = ours->payload;
+  const Bytes& other = theirs->payload;
+  const auto [at, there] = std::mismatch(one.begin(), one.end(), other.begin(), other.end());
+  if (at == one.end() && there == other.end()) {
+    return ours->sequence == theirs->sequence
+               ? std::string()
+               : fmt::format(": its sequence number is {}, in the session {}", ours->sequence,
+                             theirs->sequence);
+  }
+  const auto byte = [](auto place, auto end) {
+    return place == end ? std::string("not there") : fmt::format("{:#04x}", *place);
+  };
+  return fmt::format(": byte {} of its payload is {}, in the session {}", at - one.begin(),
+                     byte(at, one.end()), byte(there, other.end()));
+}
+
 class Player {
  public:
   Player(Session session, SessionMatch match)
@@ -160,9 +184,13 @@ class Player {
     const SessionTransfer& transfer = session_.transfers[next];
     if (transfer.kind == Kind::reopened || masked(transfer.bytes) != masked(bytes)) {
       return fail(ErrorCode::bad_data,
-                  fmt::format("the program sends {} where the session has {}", message_name(bytes),
-                              transfer.kind == Kind::reopened ? "the device opened again"
-                                                              : message_name(transfer.bytes)),
+                  transfer.kind == Kind::reopened
+                      ? fmt::format("the program sends {} where the session has the device opened "
+                                    "again",
+                                    message_name(bytes))
+                      : fmt::format("the program sends {} where the session has {}{}",
+                                    message_name(bytes), message_name(transfer.bytes),
+                                    what_differs(masked(bytes), masked(transfer.bytes))),
                   fmt::format("replayed session, transfer {}", next + 1),
                   "use the options of the recording, or match=key");
     }

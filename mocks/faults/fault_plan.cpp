@@ -49,7 +49,8 @@ constexpr std::uint64_t kMostCount = 1ULL << 40U;
 constexpr double kLongest_s = 86'400;
 
 tl::unexpected<Error> wrong(const std::string& path, std::string what) {
-  return fail(ErrorCode::configuration, std::move(what), "fault plan: " + printable(path, 100),
+  return fail(ErrorCode::configuration, std::move(what),
+              path.empty() ? "fault plan" : "fault plan: " + printable(path, 100),
               "docs/faults.md describes every key");
 }
 
@@ -222,7 +223,10 @@ Result<FaultPlan> parse_fault_plan(std::string_view text) {
     return wrong(*doubled, "this key stands twice");
   }
   const Json json = parse_json<Json>(text);
-  if (json.is_discarded() || !json.is_object()) {
+  if (json.is_discarded()) {
+    return wrong("", "this is not JSON: " + why_no_json(text));
+  }
+  if (!json.is_object()) {
     return wrong("", "this is no JSON object");
   }
   for (const auto& [key, value] : json.items()) {

@@ -15,11 +15,13 @@ namespace sixpoint::mocks {
 
 namespace {
 
+constexpr const char* kWhereSettingsAre = "docs/virtual.md lists the settings of virtual units";
+
 tl::unexpected<Error> wrong(std::string_view key, std::string_view value, std::string_view wanted) {
   return fail(ErrorCode::usage,
               fmt::format("virtual unit: {}={} is not {}", printable(key, 40), printable(value, 60),
                           wanted),
-              {}, "docs/virtual.md lists the settings of virtual units");
+              {}, kWhereSettingsAre);
 }
 
 template <class Number>
@@ -215,7 +217,10 @@ constexpr std::array<Setting, 19> kSettings = {{
 Status read_setting(std::string_view setting, std::set<std::string_view>& seen, Draft& draft) {
   const std::size_t equals = setting.find('=');
   if (equals == std::string_view::npos) {
-    return wrong(setting, "", "a setting of the form key=value");
+    return fail(ErrorCode::usage,
+                fmt::format("virtual unit: {} is not a setting of the form key=value",
+                            printable(setting, 40)),
+                {}, kWhereSettingsAre);
   }
   const std::string_view key = setting.substr(0, equals);
   const std::string_view value = setting.substr(equals + 1);

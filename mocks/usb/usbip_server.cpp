@@ -38,8 +38,9 @@ class Descriptor {
   int number_;
 };
 
-tl::unexpected<Error> system_failure(const char* doing, std::uint16_t port, const char* hint) {
-  return fail(ErrorCode::io, fmt::format("{}: {}", doing, std::strerror(errno)),
+tl::unexpected<Error> system_failure(ErrorCode code, const char* doing, std::uint16_t port,
+                                     const char* hint) {
+  return fail(code, fmt::format("{}: {}", doing, std::strerror(errno)),
               fmt::format("127.0.0.1:{}", port), hint);
 }
 
@@ -54,7 +55,8 @@ class UsbipServer::Sockets {
     stop_ = Descriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
     listener_ = Descriptor(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (stop_.get() < 0 || listener_.get() < 0) {
-      return system_failure("no socket can be made", options_.port, "close other programs");
+      return system_failure(ErrorCode::io, "no socket can be made", options_.port,
+                            "close other programs");
     }
     const int yes = 1;
     ::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -66,8 +68,8 @@ class UsbipServer::Sockets {
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     if (::bind(listener_.get(), generic, length) != 0 || ::listen(listener_.get(), 16) != 0 ||
         ::getsockname(listener_.get(), generic, &length) != 0) {
-      return system_failure("the port cannot be listened on", options_.port,
-                            "choose another port, or 0 for any that is free");
+      return system_failure(ErrorCode::device_unavailable, "the port cannot be listened on",
+                            options_.port, "choose another port, or 0 for any that is free");
     }
     port_ = ntohs(address.sin_port);
     return {};
@@ -102,7 +104,8 @@ class UsbipServer::Sockets {
       time_out.tv_sec = wait.count() / 1'000'000'000;
       time_out.tv_nsec = wait.count() % 1'000'000'000;
       if (::ppoll(watched.data(), watched.size(), &time_out, nullptr) < 0 && errno != EINTR) {
-        return system_failure("waiting for clients failed", port_, "start the command again");
+        return system_failure(ErrorCode::io, "waiting for clients failed", port_,
+                              "start the command again");
       }
       if (watched[0].revents != 0) {
         connections_.clear();

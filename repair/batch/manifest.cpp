@@ -128,6 +128,32 @@ Status check_manifest(FileSystem& files, const std::string& folder) {
   return {};
 }
 
+KnownOutputs::KnownOutputs(FileSystem& files, const std::string& folder) : files_(files) {
+  const Json json = manifest_in(files, folder);
+  const auto text = [](const Json& object, const char* key) {
+    const auto found = object.is_object() ? object.find(key) : object.end();
+    return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const auto as_of = parse_iso8601(text(json, "made_at"));
+  if (!as_of) {
+    return;
+  }
+  for (const Json& entry : json.value("files", Json::array())) {
+    KnownOutput known{text(entry, "input_sha256"), text(entry, "output_sha256"), *as_of};
+    if (!known.sha256.empty()) {
+      known_.insert_or_assign(text(entry, "output"), std::move(known));
+    }
+  }
+}
+
+std::optional<KnownOutput> KnownOutputs::of(const std::string& output) const {
+  if (known_.empty()) {
+    return std::nullopt;
+  }
+  const auto found = known_.find(name_of(files_, output));
+  return found == known_.end() ? std::nullopt : std::optional(found->second);
+}
+
 Status write_manifest(FileSystem& files, const std::string& folder,
                       const std::vector<RepairReport>& reports, UtcTime now,
                       const std::string& software) {

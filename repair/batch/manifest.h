@@ -24,6 +24,8 @@
 // Names that are no UTF-8 are escaped (\xNN); the CSV is quoted as RFC 4180 has it.
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,17 @@ namespace sixpoint::repair {
 // cannot_create where one of manifest.json, manifest.csv, units.csv and report.html is there and is
 // not ours.
 Status check_manifest(FileSystem& files, const std::string& folder);
+
+// What the manifest of a folder knew of its outputs when it was read (earlier_output.h).
+class KnownOutputs {
+ public:
+  KnownOutputs(FileSystem& files, const std::string& folder);
+  std::optional<KnownOutput> of(const std::string& output) const;
+
+ private:
+  FileSystem& files_;
+  std::map<std::string, KnownOutput> known_;  // by the name that stands in the manifest
+};
 
 Status write_manifest(FileSystem& files, const std::string& folder,
                       const std::vector<RepairReport>& reports, UtcTime now,

@@ -12,6 +12,7 @@
 #include "base/text/json_keys.h"
 #include "gt3x/recording.h"
 #include "repair/batch/jobs.h"
+#include "repair/batch/manifest.h"
 #include "repair/rescale/output_place.h"
 #include "repair/rescale/repair_mark.h"
 
@@ -32,6 +33,7 @@ class Run {
         pool_(pool),
         watch_(watch),
         stop_(stop),
+        known_(env.files, options.folder),
         answers_(files.size()) {}
 
   std::vector<RepairReport> run() {
@@ -55,7 +57,7 @@ class Run {
   }
 
  private:
-  RepairReport repair_one(const NamedFile& file, const RepairOptions& how) {
+  RepairReport repair_one(const NamedFile& file, RepairOptions how) {
     if (file.error) {
       ++failed_;
       return failed_report(file.path, *file.error);
@@ -65,6 +67,7 @@ class Run {
       ++failed_;
       return failed_report(file.path, status.error());
     }
+    how.known_output = known_.of(output);
     RepairReport report = repair_file(env_, file.path, output, source_, how);
     link_unaffected(env_.files, options_.make_link, options_.link, output, report);
     if (const auto info = env_.files.info(file.path)) {
@@ -109,7 +112,7 @@ class Run {
         [&](std::size_t k) {
           RepairOptions how = all;
           how.refuted_by = refuted_by.empty() ? "" : refuted_by[which[k]];
-          RepairReport report = repair_one(files_[which[k]], how);
+          RepairReport report = repair_one(files_[which[k]], std::move(how));
           if (watch_.did) {
             watch_.did(report);
           }
@@ -216,6 +219,7 @@ class Run {
   UnitPool& pool_;
   const RepairWatch& watch_;
   const std::atomic<bool>* stop_;
+  const KnownOutputs known_;  // before this run
   std::vector<std::optional<RepairReport>> answers_;
   // Of the pass that runs.
   std::atomic<std::uint64_t> bytes_{0};

@@ -15,6 +15,8 @@ namespace {
 // Uncertainties are estimates themselves: two that differ by less are equal.
 constexpr double kEqualShare = 1.1;
 
+std::string day_of(UtcTime time) { return to_iso8601(time).substr(0, 10); }
+
 // In the order of ConstantsKind.
 constexpr std::array<std::string_view, 3> kKindNames = {"jig", "calibration file", "file scan"};
 
@@ -96,15 +98,14 @@ std::optional<std::string> conflict_with(const Candidate& best, const std::vecto
 
 // The first other set of the same method that disagrees.
 std::string doubt_about(const Candidate& best, const std::vector<Candidate>& same_method) {
-  constexpr std::size_t kDate = 10;
   for (const Candidate& other : same_method) {
     if (const auto between = disagreement(best, other)) {
       return fmt::format(
           "the store's set {} of {} disagrees with this one, {} ({}): one of them may be of "
           "another unit, or the sensor has changed; 'sixpoint store prefer ID --why TEXT' or "
           "'store withdraw' decides",
-          db::shown_id(other.row->id), to_iso8601(other.row->made_at).substr(0, kDate),
-          db::shown_id(best.row->id), between->brief());
+          db::shown_id(other.row->id), day_of(other.row->made_at), db::shown_id(best.row->id),
+          between->brief());
     }
   }
   return {};
@@ -113,7 +114,6 @@ std::string doubt_about(const Candidate& best, const std::vector<Candidate>& sam
 // "5c0f91aa on 2026-11-22 (wrong jig)", the latest ones first; empty where there are none.
 std::string withdrawn_sets(const db::UnitHistory& history, const std::string& filter) {
   constexpr std::size_t kMostSets = 3;
-  constexpr std::size_t kDate = 10;
   std::vector<std::string> sets;
   for (const db::ConstantsRecord& row : history.constants) {
     if (row.filter != filter || !history.is_withdrawn(row.id)) {
@@ -124,8 +124,7 @@ std::string withdrawn_sets(const db::UnitHistory& history, const std::string& fi
           return one.row_id == row.id && one.action == "withdraw";
         });
     sets.insert(sets.begin(), fmt::format("{} on {} ({})", db::shown_id(row.id),
-                                          to_iso8601(last->made_at).substr(0, kDate),
-                                          printable(last->reason, 200)));
+                                          day_of(last->made_at), printable(last->reason, 200)));
   }
   const std::size_t more = sets.size() - std::min(sets.size(), kMostSets);
   sets.resize(sets.size() - more);
@@ -191,6 +190,25 @@ Applying applying_constants(const db::UnitHistory& history, calib::FilterConfigu
   answer.about[*answer.index] =
       answer.doubt.empty() ? answer.why : answer.why + "; " + answer.doubt;
   return answer;
+}
+
+std::string said_of_stored(const db::UnitHistory& history, calib::FilterConfiguration filter,
+                           const std::string& id, UtcTime now) {
+  const Applying applying = applying_constants(history, filter);
+  if (!applying.index) {
+    return applying.why;
+  }
+  const db::ConstantsRecord& set = history.constants[*applying.index];
+  if (set.id == id) {
+    return applying.doubt;
+  }
+  return fmt::format(
+      "the set {} was stored, but {} of {} {}{}; where that one is wrong: 'sixpoint store withdraw "
+      "{} --why TEXT'",
+      db::shown_id(id), db::shown_id(set.id), day_of(set.made_at), applying.why,
+      set.made_at > now ? ", its date is in the future, so a clock was ahead or this one is behind"
+                        : "",
+      db::shown_id(set.id));
 }
 
 }  // namespace sixpoint::repair

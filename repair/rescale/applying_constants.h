@@ -53,4 +53,16 @@ struct Applying {
 };
 Applying applying_constants(const db::UnitHistory& history, calib::FilterConfiguration filter);
 
+// What a person must read when the set `id` of this history was stored just now; empty for nothing:
+//
+// | by applying_constants()                | said                                                 |
+// |----------------------------------------|------------------------------------------------------|
+// | it applies, and no other one disagrees | nothing                                              |
+// | it applies, but another one disagrees  | `doubt`                                              |
+// | another one applies                    | which one, of which date, why, and how that is ended |
+// | ... of a date behind `now`             | that a clock was ahead, too                          |
+// | nothing applies                        | `why`                                                |
+std::string said_of_stored(const db::UnitHistory& history, calib::FilterConfiguration filter,
+                           const std::string& id, UtcTime now);
+
 }  // namespace sixpoint::repair

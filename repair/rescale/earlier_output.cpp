@@ -21,12 +21,18 @@ std::string recipe_digest(const Recipe& recipe) {
 }
 
 EarlierOutput judge_earlier_output(const std::optional<FoundOutput>& found,
+                                   const std::optional<KnownOutput>& known,
                                    const std::string& input_sha256, const std::string& recipe) {
   if (!found) {
     return EarlierOutput::none;
   }
   if (found->input_sha256.empty() || found->input_sha256 != input_sha256) {
     return EarlierOutput::foreign;
+  }
+  const bool is_known = known && known->input_sha256 == input_sha256 &&
+                        !(found->made_at && *found->made_at > known->as_of);
+  if (is_known && known->sha256 != found->sha256) {
+    return EarlierOutput::changed;
   }
   return found->recipe == recipe ? EarlierOutput::done : EarlierOutput::outdated;
 }

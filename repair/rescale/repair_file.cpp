@@ -503,11 +503,10 @@ class Repair {
     survey_.blocks = {};  // all that they had to say was said by now
     if (!written_ || !(written_->how == how)) {
       written_.reset();
-      const auto mark = options_.dry_run ? std::nullopt : mark_in(env_.files, output_);
+      const auto mark = mark_in(env_.files, output_);
+      SIXPOINT_ASSIGN(const auto found, found_output(mark));
       const EarlierOutput earlier =
-          options_.dry_run
-              ? EarlierOutput::none
-              : judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
+          judge_earlier_output(found, options_.known_output, report_.input_sha256, recipe());
       const bool is_done = earlier == EarlierOutput::done && options_.resume;
       if (earlier != EarlierOutput::none && !is_done &&
           !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
@@ -521,17 +520,20 @@ class Repair {
       SIXPOINT_ASSIGN(auto reader, recording.open_log());
       SIXPOINT_ASSIGN(auto log, RescaledLog::make(std::move(reader), how));
       log->expect_still(windows);
-      if (options_.dry_run) {
+      if (is_done) {
+        SIXPOINT_CHECK(compare_with_output(recording, *log));
+      } else if (options_.dry_run) {
         SIXPOINT_CHECK(read_through(*log));
-      } else if (is_done) {
-        SIXPOINT_CHECK(compare_with_output(*log));
       }
       if (options_.dry_run || is_done) {
         if (!may_be_kept(*log, windows)) {
           return not_repairable();
         }
         finish(recording, *log);
-        return is_done ? take_earlier_output(mark.value_or(Json())) : Status();
+        if (is_done) {
+          take_earlier_output(mark.value_or(Json()), *found);
+        }
+        return {};
       }
       output_files_.replaces = earlier == EarlierOutput::outdated;
       SIXPOINT_ASSIGN(auto writer, begin_output());
@@ -630,19 +632,29 @@ class Repair {
     return {};
   }
 
+  bool is_damaged(const std::string& entry) const {
+    return std::ranges::find(report_.losses, entry, &gt3x::SalvageLoss::entry) !=
+           report_.losses.end();
+  }
+
   // An entry as it is; of a damaged one, what is left of it.
   Status carry_over(gt3x::Recording& recording, const std::string& name,
                     gt3x::RecordingWriter& writer) const {
-    const bool damaged =
-        std::ranges::find(report_.losses, name, &gt3x::SalvageLoss::entry) != report_.losses.end();
-    if (!damaged) {
+    if (!is_damaged(name)) {
       return writer.copy(recording, name);
     }
-    if (name == "info.txt") {
-      return writer.add(name, recording.info().serialise());
-    }
-    SIXPOINT_ASSIGN(const auto source, recording.open_entry(name));
+    SIXPOINT_ASSIGN(const auto source, open_carried_over(recording, name));
     return writer.add(name, *source);
+  }
+
+  // The bytes that carry_over() writes, and those of an info.txt that is lost.
+  Result<std::unique_ptr<gt3x::ByteSource>> open_carried_over(gt3x::Recording& recording,
+                                                              const std::string& name) const {
+    if (name == "info.txt" && (is_damaged(name) || !recording.has_entry(name))) {
+      const std::string info = recording.info().serialise();
+      return std::make_unique<gt3x::MemorySource>(Bytes(info.begin(), info.end()));
+    }
+    return recording.open_entry(name);
   }
 
   std::string recipe() const {
@@ -658,17 +670,25 @@ class Repair {
   }
 
   // What lies where the output goes; nothing where nothing does.
-  std::optional<FoundOutput> found_output(const std::optional<Json>& mark) {
+  Result<std::optional<FoundOutput>> found_output(const std::optional<Json>& mark) const {
     if (!env_.files.link_info(output_)) {
       return std::nullopt;
     }
-    return mark ? FoundOutput{text_in(*mark, "input_sha256"), text_in(*mark, "recipe")}
-                : FoundOutput{};
+    FoundOutput found;
+    if (mark) {
+      found.input_sha256 = text_in(*mark, "input_sha256");
+      found.recipe = text_in(*mark, "recipe");
+      if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
+        found.made_at = *then;
+      }
+      SIXPOINT_ASSIGN(found.sha256, file_sha256(env_.files, output_));
+    }
+    return found;
   }
 
   // A file that would not be written now: does the output of an earlier run lie there?
   Status look_for_earlier_output() {
-    const auto mark = options_.dry_run ? std::nullopt : mark_in(env_.files, output_);
+    const auto mark = mark_in(env_.files, output_);
     if (!mark) {
       return {};
     }
@@ -696,6 +716,9 @@ class Repair {
       report_.reasons.emplace_back(kMadeOtherwise);
       return {};
     }
+    if (earlier == EarlierOutput::changed) {
+      return output_was_changed();
+    }
     return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
                 options_.resume
                     ? "it was not made of this recording, or cannot be read: look at it, and "
@@ -703,25 +726,76 @@ class Repair {
                     : "choose another folder, or --resume to go on with an earlier run");
   }
 
-  // Whether the output of an earlier run holds what would be written now, but for the mark. `log`
-  // has none.
-  Status compare_with_output(RescaledLog& log) const {
-    const auto other =
-        fail(ErrorCode::cannot_create, "the output of an earlier run is not as that run wrote it",
-             output_, "it was changed, or is damaged: look at it, and remove it");
+  Status output_was_changed() const {
+    return fail(ErrorCode::cannot_create,
+                "the output of an earlier run is not as that run wrote it", output_,
+                "it was changed, or is damaged: look at it, and remove it");
+  }
+
+  // Whether the output of an earlier run holds what write_entries() would write now, but for the
+  // marks. `log` has none.
+  Status compare_with_output(gt3x::Recording& recording, RescaledLog& log) const {
     auto there = gt3x::Recording::open(env_.files, output_);
-    if (!there) {
-      return other;
+    if (!there || there->bytes_behind() > 0) {
+      return output_was_changed();
     }
-    auto reader = there->open_log();
+    const std::vector<std::string> names = names_of_output(recording);
+    if (!std::ranges::equal(names, there->entries(), {}, {}, &gt3x::EntryInfo::name)) {
+      return output_was_changed();
+    }
+    for (const std::string& name : names) {
+      if (name == "log.bin") {
+        SIXPOINT_CHECK(compare_logs(log, *there));
+      } else if (name != mark_name(report_)) {
+        SIXPOINT_ASSIGN(const auto expected, open_carried_over(recording, name));
+        SIXPOINT_ASSIGN(const std::string ours, sha256_of(*expected));
+        const auto found = there->open_entry(name);
+        const auto theirs = found ? sha256_of(**found) : Result<std::string>(fail(found.error()));
+        if (!theirs || *theirs != ours) {
+          return output_was_changed();
+        }
+      }
+    }
+    return {};
+  }
+
+  // Of its entries, in their order.
+  std::vector<std::string> names_of_output(const gt3x::Recording& recording) const {
+    std::vector<std::string> names;
+    for (const gt3x::EntryInfo& entry : recording.entries()) {
+      if (entry.name != mark_name(report_)) {
+        names.push_back(entry.name);
+      }
+    }
+    if (!recording.has_entry("info.txt")) {
+      names.emplace_back("info.txt");
+    }
+    names.push_back(mark_name(report_));
+    return names;
+  }
+
+  static Result<std::string> sha256_of(gt3x::ByteSource& source) {
+    Sha256 hash;
+    Bytes piece(1U << 16);
+    for (;;) {
+      SIXPOINT_ASSIGN(const std::size_t count, source.read(piece));
+      if (count == 0) {
+        return to_hex(hash.finish());
+      }
+      hash.update(std::span(piece).first(count));
+    }
+  }
+
+  Status compare_logs(RescaledLog& log, gt3x::Recording& there) const {
+    auto reader = there.open_log();
     if (!reader) {
-      return other;
+      return output_was_changed();
     }
     Bytes expected;
     for (bool at_mark = true;;) {
       const auto item = reader->next();
       if (!item) {
-        return other;
+        return output_was_changed();
       }
       if (!*item) {
         break;
@@ -733,16 +807,16 @@ class Repair {
       expected.resize((*item)->raw.size());
       SIXPOINT_ASSIGN(const std::size_t count, log.read(expected));
       if (count < expected.size() || !std::ranges::equal(expected, (*item)->raw)) {
-        return other;
+        return output_was_changed();
       }
     }
     expected.resize(1);
     SIXPOINT_ASSIGN(const std::size_t more, log.read(expected));
-    return more == 0 ? Status() : other;
+    return more == 0 ? Status() : output_was_changed();
   }
 
   // What an earlier run made of this very input, with the constants that were used then.
-  Status take_earlier_output(const Json& mark) {
+  void take_earlier_output(const Json& mark, const FoundOutput& found) {
     report_.reasons.emplace_back(kDoneBefore);
     report_.resumed = true;
     report_.method = text_in(mark, "method");
@@ -751,12 +825,9 @@ class Repair {
     report_.forced = mark.value("forced", Json(false)) == Json(true);
     report_.cross_axis_applied = mark.value("cross_axis_applied", Json(false)) == Json(true);
     report_.sample_uncertainty_mg = three_in(mark, "sample_uncertainty_mg");
-    if (const auto then = parse_iso8601(text_in(mark, "repaired_at")); then) {
-      report_.repaired_at = *then;
-    }
+    report_.repaired_at = found.made_at;
     report_.output = output_;
-    SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
-    return {};
+    report_.output_sha256 = found.sha256;
   }
 
   Env& env_;

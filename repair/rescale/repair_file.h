@@ -27,7 +27,7 @@
 // | ... the output's name is that of the recording itself   | failed: cannot_create              |
 // |     (device and inode), or of a link to it              |                                    |
 // | ... output there, done (earlier_output.h), resume on    | repaired, `resumed`; nothing done  |
-// | ... ... but its log is not what would be written now    | failed: cannot_create              |
+// | ... output there, changed since it was written          | failed: cannot_create              |
 // | ... output there, outdated                              | outdated; with redo_outdated       |
 // |                                                         | replaced: repaired                 |
 // | ... output there, otherwise                             | failed: cannot_create              |
@@ -55,6 +55,7 @@
 
 #include "base/env.h"
 #include "calib/constants.h"
+#include "repair/rescale/earlier_output.h"
 #include "repair/rescale/repair_report.h"
 #include "repair/rescale/sources.h"
 #include "repair/triage/survey.h"
@@ -95,7 +96,7 @@ struct RepairOptions {
   bool store_only = false;
   // Threads that pack one file's output.
   unsigned jobs = 1;
-  // Reads, chooses and computes, but writes nothing.
+  // Reads, chooses, computes and judges what lies at the output's name, but writes nothing.
   bool dry_run = false;
   // Also turn back the axes of files whose constants are right. Off: a file that 16CPAN03 does not
   // affect is left as it is, and the reasons say that its axes are turned.
@@ -112,6 +113,8 @@ struct RepairOptions {
   bool resume = false;
   // An output that was made otherwise than it would be made now is replaced.
   bool redo_outdated = false;
+  // Of the output that may be there.
+  std::optional<KnownOutput> known_output;
   // A file on which the gate cannot check the constants (it has no still periods) is not written:
   // its report says that it waits for what they do to the unit's other files.
   bool leave_unchecked = false;

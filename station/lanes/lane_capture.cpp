@@ -167,6 +167,10 @@ void Lanes::Lane::end_capture_with(const Result<CaptureReport>& report, const st
     if (stored) {
       result["stored"] = true;
       result["constants_id"] = stored->id;
+      if (!stored->said.empty()) {
+        const std::lock_guard lane_lock(mutex_);
+        add_log("problem", stored->said);
+      }
     }
     if (!stored || stored->file_problem) {
       result["problem"] = (stored ? *stored->file_problem : stored.error()).brief();

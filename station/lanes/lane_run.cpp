@@ -358,6 +358,9 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
       if (!cleared) {
         add_log("problem", cleared.error().brief());
       }
+      if (!stored->said.empty()) {
+        add_log("problem", stored->said);
+      }
       if (is_shown) {
         result_["stored"] = !stored->is_kept_here;
         result_["kept_here"] = stored->is_kept_here;

@@ -56,6 +56,7 @@ struct RunInStore {
   RunIds ids;
   bool is_kept_here = false;           // not in the store; it goes there with the next one
   std::vector<std::string> documents;  // that can be asked for: "certificate.pdf" ...
+  std::string said = {};               // that other constants apply, or disagree with these
 };
 // Puts a run into the store.
 using StoreRun = std::function<Result<RunInStore>(const JigReport&, const RunLabels&)>;
@@ -74,6 +75,7 @@ using WriteCheck = std::function<Result<std::optional<Error>>(const WaitingConst
 struct KeptConstants {
   std::string id;                     // in the store
   std::optional<Error> file_problem;  // why FILE.constants.json was not written
+  std::string said = {};              // as in RunInStore
 };
 // Stores the constants of a calibration file, and writes them beside it.
 using StoreConstants = std::function<Result<KeptConstants>(const CaptureReport&)>;

@@ -157,6 +157,8 @@ TEST(Constants, DamagedFilesAreRefused) {
     EXPECT_FAILS(parse_constants_record(text), ErrorCode::bad_data);
   }
   EXPECT_FAILS(parse_constants_record(std::string(100'000, '[')), ErrorCode::bad_data);
+  EXPECT_EQ(parse_constants_record("{\n\"zero_lsb\": [NaN, 1, 2]}").error().what,
+            "is not JSON: line 2 at 'N'");
 }
 
 TEST(Constants, NearestStoredIsWithinHalfACount) {

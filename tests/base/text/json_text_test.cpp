@@ -24,6 +24,18 @@ TEST(JsonText, IsParsedToAHundredLevels) {
   EXPECT_TRUE(nests_too_deep(objects));
 }
 
+TEST(JsonText, ThePlaceWhereItCeasesToBeJsonIsSaid) {
+  EXPECT_EQ(why_no_json(R"({"a": [1, 2]})"), "");
+  EXPECT_EQ(why_no_json("{\"a\": 1,\n \"b\": 1e400}"), "line 2 at '1e400'");
+  EXPECT_EQ(why_no_json("{\"a\":\n\n NaN}"), "line 3 at 'N'");
+  EXPECT_EQ(why_no_json("[1,\n2 3]"), "line 2 at '3'");
+  EXPECT_EQ(why_no_json("[1,]"), "line 1 at ']'");
+  EXPECT_EQ(why_no_json("word"), "line 1 at 'w'");
+  EXPECT_EQ(why_no_json("[1"), "it ends too early");
+  EXPECT_EQ(why_no_json(""), "it ends too early");
+  EXPECT_EQ(why_no_json(brackets(101)), "it nests deeper than 100 objects and lists");
+}
+
 TEST(JsonText, BracketsInStringsAreNoLevels) {
   const std::string text = R"(["\"\\)" + std::string(500, '[') + R"(\"", "{"])";
   const auto json = parse_json(text);

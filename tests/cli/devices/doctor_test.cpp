@@ -47,6 +47,25 @@ TEST_F(StoreTest, DoctorAnswersEveryCheckAndFailsForAStoreThatWasChanged) {
   ::unsetenv("XDG_DATA_HOME");
 }
 
+TEST_F(StoreTest, DoctorNamesConstantsOfTheFuture) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  fill("a.db");
+  ManualClock clock(from_unix_seconds(1001));
+  const auto doctor = [&] {
+    Env env{clock, posix_env().files};
+    return tests::run_command(env, {"doctor", "--store", path("a.db")});
+  };
+  EXPECT_THAT(doctor().out, testing::ContainsRegex("ok +store "));
+  clock.set(from_unix_seconds(1000 - 3599));
+  EXPECT_THAT(doctor().out, testing::ContainsRegex("ok +store ")) << "the clocks of two stations";
+  clock.set(from_unix_seconds(1000 - 3601));
+  const auto answer = doctor();
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.out, testing::ContainsRegex("NO +store +constants of 1 unit are of a date in "
+                                                 "the future, those of MOS2A1 of 1970-01-01"));
+  ::unsetenv("XDG_DATA_HOME");
+}
+
 // As a user who has no rights there: root has all.
 TEST_F(StoreTest, DoctorFailsForAStoreThatTakesNothing) {
   namespace fs = std::filesystem;

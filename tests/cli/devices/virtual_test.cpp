@@ -245,6 +245,12 @@ TEST(VirtualCommand, RefusesWhatItCannotDo) {
   EXPECT_EQ(code({"virtual", "--usbip", "70000"}), 64);
   EXPECT_EQ(code({"virtual", "--count", "0"}), 64);
   EXPECT_EQ(code({"virtual", "--scenario", "/nonexistent.json"}), 66);
+  for (const char* other : {"foo", "hid:X", "hid:serial=MOS2A45130007", "hid:X=1,seed=7"}) {
+    const auto answer = tests::run_command(posix_env(), {"virtual", "--device", other});
+    EXPECT_EQ(answer.exit_code, 64) << other;
+    EXPECT_THAT(answer.people,
+                AllOf(HasSubstr(std::string("--device ") + other), HasSubstr("virtual:KEY=VALUE")));
+  }
   const tests::TemporaryFolder folder;
   std::ofstream(folder / "long.json") << R"({"schema": "sixpoint/scenario/1",
     "motions": [{"kind": "free_living", "duration_s": 8000000}]})";
@@ -252,7 +258,7 @@ TEST(VirtualCommand, RefusesWhatItCannotDo) {
   Served served({});
   const auto port = std::to_string(served.document["usbip"]["port"].get<int>());
   const auto taken = tests::run_command(posix_env(), {"virtual", "--usbip", port});
-  EXPECT_EQ(taken.exit_code, 74);
+  EXPECT_EQ(taken.exit_code, 69) << "as of a station";
   EXPECT_THAT(taken.people, HasSubstr("127.0.0.1:" + port));
 }
 

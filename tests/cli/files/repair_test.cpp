@@ -276,6 +276,34 @@ TEST_F(RepairCommand, WhatWasMadeOtherwiseIsOutdatedAndReplacedWhenAsked) {
   EXPECT_EQ(repair({"--scan", "--resume"}).exit_code, 0);
 }
 
+// A changed output is refused in each later run: what the manifest knows of it stays there.
+TEST_F(RepairCommand, AHashThatTheManifestKnowsIsNotReplaced) {
+  const auto repair = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"repair", archive_, "-o", out_, "--scan"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  };
+  ASSERT_EQ(repair({}).exit_code, 0);
+  const auto hash = [&] {
+    const Json files = Json::parse(std::ifstream(out_ + "/manifest.json"))["files"];
+    return files[0]["output_sha256"].get<std::string>();
+  };
+  const std::string first = hash();
+  ASSERT_EQ(repair({"--resume"}).exit_code, 0);
+  EXPECT_EQ(hash(), first);
+  const std::string output = out_ + "/affected.gt3x";
+  std::ofstream(output, std::ios::app | std::ios::binary) << "x";
+  for (const bool dry : {true, false, false}) {
+    const auto again = repair(dry ? std::vector<std::string>{"--resume", "--dry-run"}
+                                  : std::vector<std::string>{"--resume"});
+    EXPECT_EQ(again.exit_code, 73) << dry;
+    EXPECT_THAT(again.people + again.out, HasSubstr("not as that run wrote it"));
+    EXPECT_EQ(hash(), first);
+  }
+  std::filesystem::remove(output);
+  EXPECT_EQ(repair({"--resume"}).exit_code, 0) << "it was removed, and is made again";
+}
+
 // The input was replaced after its output was made: that it failed stands in the manifest, and what
 // is advised is no command that refuses the pair.
 TEST_F(RepairCommand, WhatFailedStandsInTheManifestAndInTheNextStep) {

@@ -107,6 +107,8 @@ const std::vector<Row>& jig_rows() {
       Row{"bit_flip", R"({"fault": "bit_flip", "at_byte": 1000, "bit": 6, "every": 400})", 0,
           "\"pass\""},
       Row{"bad_crc", R"({"fault": "bad_crc", "at_report": 2, "every": 400})", 0, "\"pass\""},
+      Row{"bad_crc_before_the_run", R"({"fault": "bad_crc", "at_report": 3, "count": 0})", 69,
+          "did not come back"},
       Row{"duplicate", R"({"fault": "duplicate", "at_report": 1, "every": 2})", 0, "\"pass\""},
       Row{"lost", R"({"fault": "lost", "at_report": 2, "every": 400})", 0, "\"pass\""},
       Row{"bad_cable", R"({"fault": "bad_crc", "of": "samples", "at_report": 2, "every": 60})", 2,
@@ -145,6 +147,19 @@ const std::vector<Row>& jig_rows() {
           R"({"fault": "power_loss", "at_s": 1, "bytes": 300, "seconds": 3600})", 69,
           "the old ones or the new", true}};
   return kRows;
+}
+
+// No constants were read and no sample was asked for: there is no run.
+TEST_F(JigFaults, BeforeARunHasBegunThereIsNoneToBeStored) {
+  const auto jig = [&](const char* faults) {
+    tests::run_command(posix_env(), {"jig", "--device", device(faults), "--store", path("s.db")});
+    return tests::run_command(posix_env(),
+                              {"history", "MOS2A45130007", "--store", path("s.db"), "--json"});
+  };
+  EXPECT_EQ(jig(R"({"fault": "bad_crc", "at_report": 3, "count": 0})").exit_code, 66);
+  const auto later = nlohmann::json::parse(jig(R"({"fault": "unplug", "at_s": 25})").out);
+  ASSERT_EQ(later["runs"].size(), 1U);
+  EXPECT_EQ(later["runs"][0]["verdict"], "inconclusive");
 }
 
 // Pulled out behind the write, for good: whether the unit holds what was measured is said plainly.

@@ -56,6 +56,39 @@ TEST_F(CommandTest, JigFindsTheSensorAndStoresIt) {
   EXPECT_EQ(run({"audit", "verify", "--store", path("s.db")}).exit_code, 0);
 }
 
+class ClockAhead final : public Clock {
+ public:
+  UtcTime now() override { return posix_env().clock.now() + std::chrono::days(1000); }
+  std::chrono::nanoseconds elapsed() override { return posix_env().clock.elapsed(); }
+  void sleep(std::chrono::nanoseconds duration) override { posix_env().clock.sleep(duration); }
+};
+
+// Constants that were measured under a clock that was ahead come before those that are measured now.
+TEST_F(CommandTest, JigSaysWhichConstantsApplyWhereItsOwnDoNot) {
+  const auto jig = [&](Clock& clock, const std::string& device) {
+    Env env{clock, posix_env().files};
+    return tests::run_command(
+        env, {"jig", "--device", device, "--jig", "virtual", "--store", path("s.db")});
+  };
+  ClockAhead ahead;
+  EXPECT_THAT(jig(ahead, kDevice).people, testing::Not(HasSubstr("was stored, but")));
+  std::string now = kDevice;
+  now.replace(now.rfind("49.9"), 4, "59.9");
+  const auto answer = jig(posix_env().clock, now);
+  EXPECT_EQ(answer.exit_code, 0) << "it passed, and is stored";
+  const auto constants =
+      run({"history", "MOS2A45130007", "--store", path("s.db"), "--json"}).json()["constants"];
+  ASSERT_EQ(constants.size(), 2U);
+  const std::string first = db::shown_id(constants[0]["id"].get<std::string>());
+  const std::string day = constants[0]["made_at"].get<std::string>().substr(0, 10);
+  EXPECT_THAT(answer.people, HasSubstr("was stored, but " + first + " of " + day + " applies"));
+  EXPECT_THAT(answer.people, HasSubstr("in the future"));
+  EXPECT_THAT(answer.people, HasSubstr("'sixpoint store withdraw " + first + " --why TEXT'"));
+  EXPECT_EQ(
+      run({"store", "withdraw", first, "--why", "a clock", "--store", path("s.db")}).exit_code, 0);
+  EXPECT_THAT(jig(posix_env().clock, now).people, testing::Not(HasSubstr("was stored, but")));
+}
+
 TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
   const auto code_of = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {"jig", "--store", path("s.db")};

@@ -1,5 +1,7 @@
 #include "device/session/session_replay.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
@@ -36,6 +38,34 @@ TEST(Replay, StrictTakesNothingElse) {
   EXPECT_FAILS(filter, ErrorCode::bad_data);
   EXPECT_THAT(filter.error().what,
               HasSubstr("the program sends 'get_filter' where the session has 'read_page'"));
+}
+
+TEST(Replay, OfTwoRequestsOfOneNameWhatDiffersIsNamed) {
+  const auto said = [](const auto& change) {
+    Session session = tests::made_session();
+    const auto read_page = std::ranges::find_if(session.transfers, [](const auto& transfer) {
+      const auto message = decode(transfer.bytes);
+      return transfer.kind == SessionTransfer::Kind::to_device && message &&
+             message->command == Command::read_page;
+    });
+    EXPECT_NE(read_page, session.transfers.end());
+    Message request = decode(read_page->bytes).value();
+    change(request);
+    const Report report = encode(request);
+    read_page->bytes.assign(report.begin(), report.end());
+    const auto unit = *WireUnit::open(replay_link(session, SessionMatch::strict));
+    const auto page = unit->read_calibration();
+    return page ? std::string() : page.error().what;
+  };
+  EXPECT_EQ(said([](Message&) {}), "");
+  EXPECT_THAT(said([](Message& request) { request.payload.at(0) ^= 1; }),
+              testing::MatchesRegex("the program sends 'read_page' where the session has "
+                                    "'read_page': byte 0 of its payload is 0x.., in the session "
+                                    "0x.."));
+  EXPECT_THAT(said([](Message& request) { request.payload.push_back(7); }),
+              HasSubstr("of its payload is not there, in the session 0x07"));
+  EXPECT_THAT(said([](Message& request) { request.sequence = 999; }),
+              HasSubstr(", in the session 999"));
 }
 
 TEST(Replay, ByKeyTakesAnyOrderAndRefusesWhatWasNeverAsked) {

@@ -73,6 +73,12 @@ TEST(FaultPlan, AWrongPlanNamesThePath) {
   }
 }
 
+TEST(FaultPlan, WhatIsNoJsonIsNamedWithItsPlace) {
+  const auto read = parse_fault_plan("{\"schema\": \"sixpoint/faults/1\",\n\"faults\": [1e400]}");
+  EXPECT_FAILS(read, ErrorCode::configuration);
+  EXPECT_EQ(read.error().what, "this is not JSON: line 2 at '1e400'");
+}
+
 // A parser would keep the last of the two, without a word about the other.
 TEST(FaultPlan, AKeyThatStandsTwiceIsRefused) {
   const std::vector<std::pair<std::string, std::string>> rows = {

@@ -91,6 +91,11 @@ TEST(VirtualSettings, RefusesWhatItDoesNotKnow) {
   }
 }
 
+TEST(VirtualSettings, AWordThatIsNoSettingIsNamedAsItWasGiven) {
+  EXPECT_EQ(parse_virtual_settings("foo", 1).error().what,
+            "virtual unit: foo is not a setting of the form key=value");
+}
+
 TEST(VirtualSettings, TheSchemeOpens) {
   device::TransportRegistry registry;
   register_virtual(registry);

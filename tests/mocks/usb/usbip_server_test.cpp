@@ -278,7 +278,7 @@ TEST(UsbipServer, AFloodOfRequestsIsCutOff) {
 TEST(UsbipServer, ATakenPortIsSaid) {
   ServerBench bench;
   EXPECT_FAILS(UsbipServer::listen({}, {.port = bench.server->port(), .limits = {}}),
-               ErrorCode::io);
+               ErrorCode::device_unavailable);
 }
 
 }  // namespace

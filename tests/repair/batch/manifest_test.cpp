@@ -98,6 +98,22 @@ TEST_F(Manifest, AnOutputThatIsOutdatedKeepsWhatIsKnownOfIt) {
   }
 }
 
+TEST_F(Manifest, KnowsItsOutputsByTheirHashes) {
+  EXPECT_FALSE(KnownOutputs(memory_.files, "out").of("out/a.gt3x")) << "there is no manifest";
+  RepairReport refused = repaired("b.gt3x");
+  refused.output.clear();
+  refused.output_sha256.clear();
+  write({repaired("a.gt3x"), refused});
+  const KnownOutputs known(memory_.files, "out");
+  const auto output = known.of("out/a.gt3x");
+  ASSERT_TRUE(output);
+  EXPECT_EQ(output->input_sha256, "aa");
+  EXPECT_EQ(output->sha256, "bb");
+  EXPECT_EQ(output->as_of, from_unix_seconds(0));
+  EXPECT_FALSE(known.of("out/b.gt3x"));
+  EXPECT_FALSE(known.of(""));
+}
+
 TEST_F(Manifest, WithoutItsJsonTheCsvIsSaidToBeHalf) {
   write({repaired("a.gt3x")});
   ASSERT_OK(memory_.files.remove("out/manifest.json"));

@@ -181,5 +181,30 @@ TEST(ApplyingConstants, SetsOfEarlierVersionsAreToldByTheirMethod) {
   EXPECT_EQ(sets.applying(), "set 0") << "what cannot be read is not compared";
 }
 
+TEST(ApplyingConstants, WhatIsSaidOfASetThatWasStoredFollowsTheTable) {
+  Sets sets;
+  const auto said = [&](const std::string& id, int today) {
+    return said_of_stored(sets.history, FilterConfiguration::current, id,
+                          from_unix_seconds(86'400LL * today));
+  };
+  const auto first = sets.add("jig", 10, 1);
+  EXPECT_EQ(said(first, 10), "");
+  const auto other = sets.add("jig", 11, 1, 100);
+  EXPECT_THAT(said(other, 11), HasSubstr("disagrees with this one"));
+  const auto earlier = sets.add("jig", 9, 1);
+  EXPECT_EQ(said(earlier, 11),
+            "the set set 2 was stored, but set 1 of 1970-01-12 applies: the latest by jig; where "
+            "that one is wrong: 'sixpoint store withdraw set 1 --why TEXT'");
+  EXPECT_EQ(said(earlier, 10),
+            "the set set 2 was stored, but set 1 of 1970-01-12 applies: the latest by jig, its "
+            "date is in the future, so a clock was ahead or this one is behind; where that one is "
+            "wrong: 'sixpoint store withdraw set 1 --why TEXT'");
+  const auto scan = sets.add("file_scan", 12, 1, -100);
+  EXPECT_THAT(said(scan, 12), HasSubstr("'sixpoint store prefer ID --why TEXT'"));
+  sets.correct(other, "withdraw");
+  sets.correct(scan, "withdraw");
+  EXPECT_EQ(said(first, 12), "");
+}
+
 }  // namespace
 }  // namespace sixpoint::repair

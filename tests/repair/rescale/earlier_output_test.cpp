@@ -8,13 +8,40 @@ namespace sixpoint::repair {
 namespace {
 
 TEST(EarlierOutputs, ByTheirTable) {
-  EXPECT_EQ(judge_earlier_output(std::nullopt, "a", "now"), EarlierOutput::none);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"", "now"}, "a", "now"), EarlierOutput::foreign);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"b", "now"}, "a", "now"), EarlierOutput::foreign);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"", "now"}, "", "now"), EarlierOutput::foreign);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"a", "now"}, "a", "now"), EarlierOutput::done);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"a", "then"}, "a", "now"), EarlierOutput::outdated);
-  EXPECT_EQ(judge_earlier_output(FoundOutput{"a", ""}, "a", "now"), EarlierOutput::outdated);
+  const auto judge = [](const std::optional<FoundOutput>& found, const std::string& input) {
+    return judge_earlier_output(found, std::nullopt, input, "now");
+  };
+  const auto says = [](const std::string& input, const std::string& recipe) {
+    return FoundOutput{input, recipe, from_unix_seconds(5), "its own"};
+  };
+  EXPECT_EQ(judge(std::nullopt, "a"), EarlierOutput::none);
+  EXPECT_EQ(judge(FoundOutput{}, "a"), EarlierOutput::foreign);
+  EXPECT_EQ(judge(says("", "now"), "a"), EarlierOutput::foreign);
+  EXPECT_EQ(judge(says("b", "now"), "a"), EarlierOutput::foreign);
+  EXPECT_EQ(judge(says("", "now"), ""), EarlierOutput::foreign);
+  EXPECT_EQ(judge(says("a", "now"), "a"), EarlierOutput::done);
+  EXPECT_EQ(judge(says("a", "then"), "a"), EarlierOutput::outdated);
+  EXPECT_EQ(judge(says("a", ""), "a"), EarlierOutput::outdated);
+}
+
+TEST(EarlierOutputs, WhatIsNotAsTheManifestKnowsItWasChanged) {
+  const auto judge = [](const KnownOutput& known, const std::string& recipe,
+                        std::optional<UtcTime> made_at = from_unix_seconds(5)) {
+    return judge_earlier_output(FoundOutput{"a", recipe, made_at, "its own"}, known, "a", "now");
+  };
+  const auto manifest = [](const std::string& input, const std::string& sha256, int as_of_s = 5) {
+    return KnownOutput{input, sha256, from_unix_seconds(as_of_s)};
+  };
+  EXPECT_EQ(judge(manifest("a", "its own"), "now"), EarlierOutput::done);
+  EXPECT_EQ(judge(manifest("a", "its own"), "then"), EarlierOutput::outdated);
+  EXPECT_EQ(judge(manifest("a", "another"), "now"), EarlierOutput::changed);
+  EXPECT_EQ(judge(manifest("a", "another"), "then"), EarlierOutput::changed);
+  EXPECT_EQ(judge(manifest("b", "another"), "now"), EarlierOutput::done) << "of another input";
+  EXPECT_EQ(judge(manifest("a", "another", 4), "now"), EarlierOutput::done)
+      << "made by a run that left no manifest";
+  EXPECT_EQ(judge(manifest("a", "another", 6), "now"), EarlierOutput::changed);
+  EXPECT_EQ(judge(manifest("a", "another"), "now", std::nullopt), EarlierOutput::changed)
+      << "a mark without a time";
 }
 
 TEST(EarlierOutputs, ARecipeIsConstantsOptionsAndRules) {

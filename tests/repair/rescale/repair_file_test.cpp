@@ -729,6 +729,119 @@ TEST_F(RepairFile, AnOutputThatWasChangedIsNotTakenForDone) {
   EXPECT_TRUE(output() == changed) << "it is left for a person";
 }
 
+// Packs out.gt3x anew with another info.txt, one more entry, other places of its entries, or bytes
+// behind it. Each reader of zip archives takes it.
+struct Repack {
+  bool other_info = false;
+  bool one_more = false;
+  bool other_order = false;
+  bool bytes_behind = false;
+};
+void repack(FileSystem& files, const Repack& how) {
+  auto recording = gt3x::Recording::open(files, "out.gt3x").value();
+  auto entries = recording.entries();
+  if (how.other_order) {
+    std::swap(entries.at(0), entries.at(1));
+  }
+  auto writer = gt3x::RecordingWriter::create(files, "changed.gt3x", {}).value();
+  for (const gt3x::EntryInfo& entry : entries) {
+    if (how.other_info && entry.name == "info.txt") {
+      gt3x::Info info = recording.info();
+      std::string text = info.serialise();
+      const auto at = text.find("MOS2A45130450");
+      ASSERT_NE(at, std::string::npos);
+      text[at + 12] = '1';
+      ASSERT_OK(writer.add(entry.name, text));
+    } else {
+      ASSERT_OK(writer.copy(recording, entry.name));
+    }
+  }
+  if (how.one_more) {
+    ASSERT_OK(writer.add("more.txt", "more"));
+  }
+  ASSERT_OK(writer.commit());
+  ASSERT_OK(files.rename("changed.gt3x", "out.gt3x"));
+  if (how.bytes_behind) {
+    const Bytes whole = read_file(files, "out.gt3x").value();
+    Bytes longer = whole;
+    longer.push_back(0);
+    ASSERT_OK(files.remove("out.gt3x"));
+    ASSERT_OK(files.create("out.gt3x").value()->write_at(0, longer));
+  }
+}
+
+TEST_F(RepairFile, AnOutputIsDoneAsAWhole) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  RepairOptions options;
+  options.resume = true;
+  for (const auto& [why, how] : {std::pair("info.txt", Repack{true, false, false, false}),
+                                 {"one more entry", Repack{false, true, false, false}},
+                                 {"another order", Repack{false, false, true, false}},
+                                 {"bytes behind it", Repack{false, false, false, true}}}) {
+    ASSERT_FALSE(repair(options).resumed) << why;
+    repack(memory_.files, how);
+    const auto changed = output();
+    const RepairReport report = repair(options);
+    EXPECT_EQ(report.status, RepairStatus::failed) << why;
+    EXPECT_EQ(report.error.value_or(Error{}).code, ErrorCode::cannot_create) << why;
+    EXPECT_THAT(report.reasons.back(), testing::HasSubstr("not as that run wrote it")) << why;
+    EXPECT_TRUE(output() == changed) << why;
+    ASSERT_OK(memory_.files.remove("out.gt3x"));
+  }
+}
+
+// What an earlier version of the program packed otherwise is done, where no manifest knows it.
+TEST_F(RepairFile, AnOutputOfTheSameEntriesIsDoneHoweverItIsPacked) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  RepairOptions options;
+  const RepairReport first = repair(options);
+  options.resume = true;
+  options.known_output = KnownOutput{first.input_sha256, first.output_sha256, memory_.clock.now()};
+  EXPECT_TRUE(repair(options).resumed);
+  auto recording = gt3x::Recording::open(memory_.files, "out.gt3x").value();
+  gt3x::WriterOptions stored;
+  stored.packing = gt3x::Packing::store;
+  auto writer = gt3x::RecordingWriter::create(memory_.files, "changed.gt3x", stored).value();
+  for (const gt3x::EntryInfo& entry : recording.entries()) {
+    ASSERT_OK(writer.add(entry.name, *recording.open_entry(entry.name).value()));
+  }
+  ASSERT_OK(writer.commit());
+  ASSERT_OK(memory_.files.rename("changed.gt3x", "out.gt3x"));
+  EXPECT_EQ(repair(options).status, RepairStatus::failed) << "the manifest knows another hash";
+  options.known_output.reset();
+  EXPECT_TRUE(repair(options).resumed);
+}
+
+TEST_F(RepairFile, ADryRunJudgesTheOutputThatIsThere) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  ASSERT_EQ(repair().status, RepairStatus::repaired);
+  const auto both_say = [&](RepairOptions options, RepairStatus status, const std::string& reason) {
+    const auto before = output();
+    options.dry_run = true;
+    const RepairReport dry = repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
+    EXPECT_TRUE(output() == before);
+    options.dry_run = false;
+    const RepairReport real = repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
+    EXPECT_EQ(dry.status, status) << reason;
+    EXPECT_EQ(real.status, status) << reason;
+    EXPECT_EQ(dry.reasons, real.reasons);
+    EXPECT_EQ(dry.resumed, real.resumed);
+    EXPECT_THAT(dry.reasons.back(), testing::HasSubstr(reason));
+  };
+  RepairOptions resume;
+  resume.resume = true;
+  both_say({}, RepairStatus::failed, "there already");
+  both_say(resume, RepairStatus::repaired, "by an earlier run");
+  RepairOptions wide = resume;
+  wide.wide = true;
+  both_say(wide, RepairStatus::outdated, "--redo-outdated");
+  repack(memory_.files, {true, false, false, false});
+  both_say(resume, RepairStatus::failed, "not as that run wrote it");
+  ASSERT_OK(memory_.files.remove("out.gt3x"));
+  ASSERT_OK(write_file(memory_.files, "out.gt3x", "another recording"));
+  both_say(resume, RepairStatus::failed, "there already");
+}
+
 // Another file takes the input's name before it is opened for the time `before`.
 class SwappingFiles final : public ForwardingFiles {
  public:

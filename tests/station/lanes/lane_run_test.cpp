@@ -560,6 +560,19 @@ TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
   EXPECT_EQ(station.reports.size(), 1U);
 }
 
+TEST(LaneRun, ThatOtherConstantsApplyIsSaid) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.said = "stored, but others apply";
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  ASSERT_FALSE(lane["log"].empty());
+  EXPECT_EQ(lane["log"].back()["kind"], "problem") << "the page shows the last one";
+  EXPECT_EQ(lane["log"].back()["text"], "stored, but others apply");
+}
+
 // To try again would help nothing, and no second run could be made.
 TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
   const tests::TemporaryFolder folder;

@@ -91,7 +91,7 @@ class Station {
           authenticated.push_back(labels.is_authenticated);
           kinds.push_back(labels.kind);
           jigs.push_back(labels.jig_id);
-          return RunInStore{{"abc123", "def456"}, is_kept_here, {"report.json"}};
+          return RunInStore{{"abc123", "def456"}, is_kept_here, {"report.json"}, said};
         },
         store_constants);
     EXPECT_OK(opened);
@@ -182,6 +182,7 @@ class Station {
   bool has_defect = false;                  // to store throws
   std::atomic<bool> start_has_defect{false};
   bool is_kept_here = false;                    // the journal has it
+  std::string said;                             // of the constants, when they are stored
   std::optional<Error> constants_file_problem;  // the disk takes no FILE.constants.json
 
  private:
