@@ -128,6 +128,8 @@ class BadInput(InFolder):
             lambda: sixpoint.solve(path, altitude=500.0),
             lambda: sixpoint.solve(path, gravity=1.62),
             lambda: sixpoint.repair(path, self.folder / "out", link_unaffected="soft"),
+            lambda: sixpoint.repair(path, self.folder / "out", scan=True, store=""),
+            lambda: sixpoint.scan(path, store=""),
         ):
             with self.assertRaises(sixpoint.UsageError):
                 call()

@@ -19,7 +19,12 @@ def _paths(paths: Path | Iterable[Path]) -> list[bytes]:
 
 
 def _or_empty(path: Optional[Path]) -> bytes:
-    return b"" if path is None else as_bytes(path)
+    if path is None:
+        return b""
+    name = as_bytes(path)
+    if not name:  # an empty variable would mean no store
+        raise UsageError("usage", "a path is empty", "", "give a path, or None for none")
+    return name
 
 
 def inspect(path: Path, *, salvage: bool = False) -> Inspection:
