@@ -161,20 +161,22 @@ void Lanes::Lane::end_capture_with(const Result<CaptureReport>& report, const st
     return end_capture_by(report.error(), serial);
   }
   Json result = result_of(*report);
+  std::string said;
   if (report->usable()) {
     const std::lock_guard lock(shared_.store_mutex);
     const auto stored = shared_.store_constants(*report);
     if (stored) {
       result["stored"] = true;
       result["constants_id"] = stored->id;
-      if (!stored->said.empty()) {
-        const std::lock_guard lane_lock(mutex_);
-        add_log("problem", stored->said);
-      }
+      said = stored->said;
     }
     if (!stored || stored->file_problem) {
       result["problem"] = (stored ? *stored->file_problem : stored.error()).brief();
     }
+  }
+  if (!said.empty()) {
+    const std::lock_guard lock(mutex_);
+    add_log("problem", std::move(said));
   }
   end_capture(std::move(result));
 }

@@ -53,6 +53,17 @@ TEST(LaneCapture, AConstantsFileThatWasNotWrittenIsSaid) {
   EXPECT_EQ(check["problem"], result["problem"]);
 }
 
+TEST(LaneCapture, ThatOtherConstantsApplyIsSaid) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.said = "stored, but others apply";
+  station.start("/api/capture", {{"lane", 1}});
+  const Json lane = station.wait_state(1, "done");
+  ASSERT_FALSE(lane["log"].empty());
+  EXPECT_EQ(lane["log"].back()["kind"], "problem");
+  EXPECT_EQ(lane["log"].back()["text"], "stored, but others apply");
+}
+
 TEST(LaneCapture, ACaptureSurvivesAReplugAndAsksTheSideUnderWayAgain) {
   const tests::TemporaryFolder folder;
   Station station({kCaptured}, folder.path());

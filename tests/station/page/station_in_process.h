@@ -71,7 +71,7 @@ class Station {
     };
     const StoreConstants store_constants = [this](const CaptureReport&) {
       const std::lock_guard lock(mutex);
-      return KeptConstants{"c0ffee", constants_file_problem};
+      return KeptConstants{"c0ffee", constants_file_problem, said};
     };
     auto opened = Lanes::open(
         posix_env(), registry_, options,
