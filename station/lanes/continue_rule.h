@@ -16,7 +16,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "station/lanes/run_folder.h"
+#include "station/lanes/unfinished_run.h"
 
 namespace sixpoint::station {
 
