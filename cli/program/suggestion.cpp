@@ -1,6 +1,7 @@
 #include "cli/program/suggestion.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include <CLI/App.hpp>
 #include <CLI/Error.hpp>
@@ -147,8 +148,10 @@ std::optional<std::string> unknown_word(const CLI::App& app,
     if (word == "--") {
       break;
     }
-    if (word.starts_with("--")) {
-      const std::string name = word.substr(0, word.find('='));
+    const bool is_short =
+        word.size() > 1 && word[0] == '-' && std::isalpha(static_cast<unsigned char>(word[1])) != 0;
+    if (is_short || word.starts_with("--")) {
+      const std::string name = word.substr(0, is_short ? 2 : word.find('='));
       if (command->get_option_no_throw(name) == nullptr) {
         return fmt::format("'{}' has no option '{}'{} '{} --help' lists them", path,
                            printable(name, 60), did_you_mean(name, option_names(*command)), path);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "base/text/counted.h"
 #include "base/text/json_text.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
@@ -478,9 +479,8 @@ Status serve(const StationCommandOptions& options, Context& context) {
   context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http",
                              server->host(), server->port(), sign_in.first_code())
               << std::flush;
-  context.people << fmt::format(
-                        "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
-                        lanes->size(), lanes->size() == 1 ? "" : "s")
+  context.people << fmt::format("{}; Ctrl-C ends the station, runs go on at the next start\n",
+                                counted(lanes->size(), "lane"))
                  << std::flush;
   take_stop(context, serve_until_signal(*server, signals, end));
   return {};

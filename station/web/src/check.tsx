@@ -2,7 +2,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import { SignForm, type SetProblem } from './lock';
 import { S } from './strings';
-import { ask } from './station';
+import { ask } from './connection';
 import type { Chart, CheckUnitsView, State, Title } from './types';
 
 const C = S.check;

@@ -1,7 +1,7 @@
 // A browser that is not signed in asks for a code; one that is gives a code to the next.
 import { useState } from 'preact/hooks';
 import { S } from './strings';
-import { ask, operatorIs, signIn, type Refusal } from './station';
+import { ask, operatorIs, signIn, type Refusal } from './connection';
 import type { Me } from './types';
 
 const E = S.entry;

@@ -4,7 +4,7 @@ import { LiveBox, PosePicture } from './box';
 import { CaptureSteps, VirtualHand } from './lane';
 import { ResultBox } from './result';
 import { S } from './strings';
-import { ask, client, type Refusal } from './station';
+import { ask, client, type Refusal } from './connection';
 import { POSES, type State } from './types';
 
 const F = S.files;

@@ -1,5 +1,5 @@
 // When the readings of a lane are drawn.
-import { traces, type Trace } from './station';
+import { traces, type Trace } from './connection';
 
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
 const CALM_MS = 250;

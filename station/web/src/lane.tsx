@@ -4,7 +4,7 @@ import { LiveBox, PosePicture } from './box';
 import { ResultBox, tone } from './result';
 import { S } from './strings';
 import { useSounds } from './sounds';
-import { ask, client, type Refusal } from './station';
+import { ask, client, type Refusal } from './connection';
 import { Spark, TraceChart } from './traces';
 import { POSES, type Lane, type Live, type Lock, type Pose, type Printer, type State } from './types';
 

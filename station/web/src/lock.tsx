@@ -1,7 +1,7 @@
 // The lock: a station whose check unit is out of control says so on every screen, and takes the signature.
 import { useState } from 'preact/hooks';
 import { S } from './strings';
-import { ask, type Refusal } from './station';
+import { ask, type Refusal } from './connection';
 import type { Lock } from './types';
 
 const L = S.lock;

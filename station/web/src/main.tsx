@@ -11,7 +11,7 @@ import { Today } from './today';
 import { soundsAreOn, turnSounds } from './sounds';
 import { chooseLanguage, language, LANGUAGES, S } from './strings';
 import { serialOf, useScanner } from './scanner';
-import { ask, current, subscribe, type Refusal } from './station';
+import { ask, current, subscribe, type Refusal } from './connection';
 
 function Page() {
   const [, again] = useReducer((n: number) => n + 1, 0);

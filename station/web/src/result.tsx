@@ -1,7 +1,7 @@
 // What a run came to: the biggest words, what to do, where it is stored, its papers, its numbers.
 import { useState } from 'preact/hooks';
 import type { SetProblem } from './lock';
-import { ask } from './station';
+import { ask } from './connection';
 import { S } from './strings';
 import type { Printer, Quantity, Result } from './types';
 

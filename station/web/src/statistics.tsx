@@ -2,7 +2,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import type { SetProblem } from './lock';
 import { S } from './strings';
-import { ask } from './station';
+import { ask } from './connection';
 import type { GageView, Group, StatisticsView, Studies } from './types';
 
 const T = S.statistics;

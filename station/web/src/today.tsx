@@ -3,7 +3,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { Papers, PrintedLabel, tone } from './result';
 import type { SetProblem } from './lock';
 import { S } from './strings';
-import { ask } from './station';
+import { ask } from './connection';
 import type { State, TodayRun } from './types';
 
 const T = S.today;

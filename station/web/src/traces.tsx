@@ -4,7 +4,7 @@ import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import { follow } from './frames';
 import { S } from './strings';
-import { KEPT, type Trace } from './station';
+import { KEPT, type Trace } from './connection';
 
 // Told apart by dash as well as by colour.
 const AXES = [

@@ -69,6 +69,9 @@ TEST_F(UnknownWord, NamesTheCommandAndTheOptionThatWereMeant) {
 TEST_F(UnknownWord, SaysOnlyThatItIsUnknownWhereNothingIsNear) {
   EXPECT_EQ(of({"frobnicate"}),
             "'sixpoint' has no command 'frobnicate'; 'sixpoint --help' lists them");
+  EXPECT_EQ(of({"-x"}), "'sixpoint' has no option '-x'; 'sixpoint --help' lists them");
+  EXPECT_EQ(of({"repair", "a", "-x", "b"}),
+            "'sixpoint repair' has no option '-x'; 'sixpoint repair --help' lists them");
   EXPECT_THAT(of({"scan", "--a\x1b[2Jb"}), HasSubstr("has no option '--a"));
   EXPECT_EQ(of({"scan", "--a\x1b[2Jb"}).find('\x1b'), std::string::npos);
 }
@@ -76,6 +79,9 @@ TEST_F(UnknownWord, SaysOnlyThatItIsUnknownWhereNothingIsNear) {
 TEST_F(UnknownWord, NothingWhereEveryWordIsKnown) {
   EXPECT_EQ(of({"scan", "archive", "--json", "--store", "x.db"}), "nothing");
   EXPECT_EQ(of({"store", "export"}), "nothing");
+  EXPECT_EQ(of({"repair", "a", "-o", "b"}), "nothing");
+  EXPECT_EQ(of({"repair", "a", "-oB"}), "nothing") << "an option with its value";
+  EXPECT_EQ(of({"jig", "--latitude", "-12.5"}), "nothing") << "a number";
   EXPECT_EQ(of({"scan", "--", "--jsn"}), "nothing") << "behind -- there are no options";
   EXPECT_EQ(of({}), "nothing");
 }
