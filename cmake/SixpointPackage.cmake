@@ -42,9 +42,8 @@ sixpoint_package(mocks
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/sixpoint-config.cmake.in
   ${PROJECT_BINARY_DIR}/sixpoint-config.cmake INSTALL_DESTINATION ${sixpoint_package_folder})
-# Before version 1 a minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/sixpoint-config-version.cmake
-  COMPATIBILITY SameMinorVersion)
+  COMPATIBILITY SameMajorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/sixpoint-config.cmake
   ${PROJECT_BINARY_DIR}/sixpoint-config-version.cmake
   DESTINATION ${sixpoint_package_folder} COMPONENT dev)

@@ -3,7 +3,7 @@
 // and after, hashes.
 //
 //   SIXPOINT_CHECK(check_manifest(files, "repaired"));  // before the work
-//   SIXPOINT_CHECK(write_manifest(files, "repaired", reports, now, "sixpoint 0.1.0"));
+//   SIXPOINT_CHECK(write_manifest(files, "repaired", reports, now, "sixpoint 1.0.0"));
 //
 // units.csv beside them has a line per unit of the run (repair/units/unit_needs.h).
 //

@@ -6,7 +6,7 @@
 //     study.add(report);
 //   }
 //   study.add_thumbnails(files);   // reads the worst files, before and after
-//   const std::string page = study.html({"Repair of /data/archive", "2026-11-23", "sixpoint 0.1"});
+//   const std::string page = study.html({"Repair of /data/archive", "2026-11-23", "sixpoint 1.0.0"});
 //
 // Sections: totals; a line per unit (repair/units/unit_needs.h); what could not be done, with its
 // reasons; files, the worst first by their still error before the repair; ENMO before and after of

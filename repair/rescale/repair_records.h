@@ -1,6 +1,6 @@
 // What the store records about files that were repaired: each file once, however often it is asked.
 //
-//   const RepairRecords made = records_of(store, reports, "sixpoint 0.1.0");
+//   const RepairRecords made = records_of(store, reports, "sixpoint 1.0.0");
 //   for (const auto& record : made.records) SIXPOINT_CHECK(store.add_repair(record));
 //
 // | report                                                       | record                         |

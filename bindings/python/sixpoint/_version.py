@@ -1,3 +1,3 @@
 """The version of the package, that of the program; a test compares the two."""
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
